@@ -1,0 +1,58 @@
+# Two commands do all the set-up: `make demo` and `make test`.
+PYTHON ?= python3
+VENV   ?= .venv
+BIN    := $(VENV)/bin
+FACADE := $(BIN)/facade
+OUT    ?= build/demo
+DATA   ?=
+
+.PHONY: demo demo-real test check lint types golden docs lock bench samples clean
+
+# --- environment: pinned by requirements.lock, with hashes ---------------------------------------
+$(VENV)/.ready: requirements.lock pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --only-binary :all: -r requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	touch $@
+
+# --- the main job ---------------------------------------------------------------------------------
+demo: $(VENV)/.ready
+	$(MAKE) --no-print-directory -f examples/demo/Makefile FACADE=$(FACADE) OUT=$(OUT)
+
+demo-real: $(VENV)/.ready
+	$(MAKE) --no-print-directory -f examples/demo/Makefile FACADE=$(FACADE) OUT=build/demo-real \
+	  HOUSES=$(DATA) real
+
+# --- proof ----------------------------------------------------------------------------------------
+test: $(VENV)/.ready
+	$(BIN)/python -m pytest -n 2 -q
+
+lint: $(VENV)/.ready
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: $(VENV)/.ready
+	$(BIN)/mypy
+
+check: lint types test
+
+golden: $(VENV)/.ready
+	$(BIN)/python -m pytest -q tests/test_golden.py --update-golden
+
+docs: $(VENV)/.ready
+	$(BIN)/python docs/make_reference.py
+
+bench: $(VENV)/.ready
+	for b in benchmarks/bench_*.py; do $(BIN)/python $$b || exit 1; done
+
+samples: $(VENV)/.ready
+	$(BIN)/python sample_data/make_samples.py
+
+# --- upkeep ---------------------------------------------------------------------------------------
+lock:
+	uv pip compile --universal --python-version 3.11 --generate-hashes --extra dev --extra cluster \
+	  --no-header --no-annotate --no-emit-index-url --quiet pyproject.toml build-requirements.in \
+	  -o requirements.lock
+
+clean:
+	rm -rf build dist *.egg-info .venv

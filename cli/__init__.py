@@ -1,0 +1,1 @@
+"""The facade command: one thin module a stage."""

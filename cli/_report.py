@@ -1,0 +1,102 @@
+"""What the user sees beside the artifacts: errors, warnings, progress. All on standard error."""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+import time
+from collections.abc import Sequence
+
+import click
+
+from ..errors import FacadeError
+
+LOGGER = "facade_tools"
+PATIENCE = 1.0  # seconds before a bar appears
+
+
+def start_logging(verbose: int, quiet: bool) -> None:
+    """Send the library's log to standard error at the level that the options ask for."""
+    level = (
+        logging.ERROR if quiet else (logging.WARNING, logging.INFO, logging.DEBUG)[min(verbose, 2)]
+    )
+    logger = logging.getLogger(LOGGER)
+    logger.handlers = [_Handler()]
+    logger.setLevel(level)
+    logger.propagate = False
+
+
+class _Handler(logging.Handler):
+    def emit(self, record: logging.LogRecord) -> None:
+        click.echo(f"facade: {record.levelname.lower()}: {record.getMessage()}", err=True)
+
+
+def explain(error: BaseException, arguments: Sequence[str]) -> int:
+    """Tell the user what went wrong in one line; return the exit code."""
+    if isinstance(error, click.exceptions.Exit):
+        return error.exit_code
+    if isinstance(error, click.Abort | KeyboardInterrupt):
+        return 130
+    if isinstance(error, BrokenPipeError):  # the reader of a pipe has had enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    if isinstance(error, click.ClickException):
+        error.show()
+        return 2
+    if "--debug" in arguments:
+        import traceback
+
+        traceback.print_exception(error)
+    say_error(_stage(arguments), error)
+    return error.exit_code if isinstance(error, FacadeError) else 1
+
+
+def say_error(stage: str, error: BaseException) -> None:
+    """Write the one line of an error."""
+    if isinstance(error, FacadeError):
+        text = str(error)
+    else:
+        text = f"unexpected failure, a bug: {type(error).__name__}: {error} (--debug shows where)"
+    line = " ".join(text.split())
+    click.echo(f"facade {stage}: error: {line}".replace(" : ", ": "), err=True)
+
+
+def _stage(arguments: Sequence[str]) -> str:
+    from ._group import STAGES
+
+    return next((word for word in arguments if word in STAGES), "")
+
+
+class Progress:
+    """A line on a terminal's standard error that says how far a stream is; silent elsewhere."""
+
+    def __init__(self, stage: str) -> None:
+        """Start the clock; nothing is shown within the first second."""
+        self.stage = stage
+        self.count = 0
+        self.start = self.shown = time.monotonic()
+        quiet = logging.getLogger(LOGGER).level >= logging.ERROR
+        self.enabled = sys.stderr.isatty() and not quiet
+        self.drawn = False
+
+    def advance(self, fraction: float | None = None) -> None:
+        """Count one item more; `fraction` of all the work, where it is known."""
+        self.count += 1
+        now = time.monotonic()
+        if self.enabled and now - self.start > PATIENCE and now - self.shown > 0.1:
+            self.shown, self.drawn = now, True
+            rate = self.count / (now - self.start)
+            share = "" if fraction is None else f" {_bar(fraction)}"
+            text = f"facade {self.stage}:{share} {self.count} done, {rate:.3g} a second"
+            click.echo(f"\r{text}\x1b[K", nl=False, err=True)
+
+    def close(self) -> None:
+        """Remove the line."""
+        if self.drawn:
+            click.echo("\r\x1b[K", nl=False, err=True)
+
+
+def _bar(fraction: float, width: int = 24) -> str:
+    full = round(width * min(max(fraction, 0.0), 1.0))
+    return f"[{'#' * full}{'.' * (width - full)}] {fraction:4.0%}"

@@ -1,0 +1,174 @@
+"""Stages over streams: read, map in order, write; the same for every stage."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import click
+
+from ..artifacts.documents import encode
+from ..artifacts.numbers import dump_document, dump_line
+from ..artifacts.provenance import Provenance, Source
+from ..artifacts.store import RawItem, digest, read_raw
+from ..artifacts.writing import atomic_file, write_bytes
+from ..errors import FacadeError, InvalidInput, OutputFailed
+from ..parallel import map_ordered
+from ..randomness import item_generator
+from ._options import StreamOptions
+from ._report import Progress, say_error
+
+
+@dataclass(frozen=True)
+class ItemStage:
+    """A stage's library function with its options, ready to run on raw items in any process.
+
+    `function(artifact, **options)` returns an artifact or an iterable of them; where `seed` is
+    not None it also takes `rng`, the generator of the item. `recorded` are the options that the
+    provenance names, `sources` the side inputs (model, library).
+    """
+
+    name: str
+    reads: tuple[str, ...]
+    function: Callable[..., Any]
+    options: Mapping[str, Any] = field(default_factory=dict)
+    recorded: Mapping[str, Any] = field(default_factory=dict)
+    sources: tuple[Source, ...] = ()
+    seed: int | None = None
+    indented: bool = False
+
+    def __call__(self, item: RawItem) -> list[tuple[str, bytes]]:
+        """Return id and bytes of every artifact made from `item`."""
+        artifact = item.artifact(*self.reads)
+        rng = (
+            {} if self.seed is None else {"rng": item_generator(self.seed, self.name, artifact.id)}
+        )
+        try:
+            results = self.function(artifact, **self.options, **rng)
+        except InvalidInput as error:
+            raise error.at(item.source, item.line) from None
+        except FacadeError as error:
+            raise type(error)(f"{_place(item)}: {artifact.id}: {error}") from None
+        inputs = (item.provenance(), *self.sources)
+        provenance = Provenance(self.name, self.seed, self.recorded, inputs)
+        dump = dump_document if self.indented else dump_line
+        return [
+            (result.id, dump(encode(replace(result, provenance=provenance))))
+            for result in (results if isinstance(results, Iterable) else [results])
+        ]
+
+
+def _place(item: RawItem) -> str:
+    return item.source if item.line is None else f"{item.source}:{item.line}"
+
+
+def side_input(path: str | None) -> tuple[Source, ...]:
+    """Return the provenance of a side input (model, library) if one was named."""
+    return () if path is None else (digest(path),)
+
+
+def run_stream(stage: ItemStage, stream: StreamOptions) -> None:
+    """Run a stage over all inputs; raises the first error, or after --on-error skip the last."""
+    stage = replace(stage, seed=stream.seed, indented=_single(stream.output))
+    outcomes = map_ordered(
+        stage, read_raw(stream.inputs), jobs=stream.jobs, scheduler=stream.scheduler
+    )
+    progress = Progress(stage.name)
+    bad = 0
+    with open_sink(stream.output) as write:
+        for outcome in outcomes:
+            if outcome.error is None:
+                for identity, data in outcome.value or []:
+                    write(identity, data)
+            elif stream.on_error == "stop" or not isinstance(outcome.error, FacadeError):
+                _show_remote(outcome.traceback)
+                raise outcome.error
+            else:
+                say_error(stage.name, outcome.error)
+                bad += 1
+            progress.advance()
+        progress.close()
+    if bad:
+        raise InvalidInput(f"{bad} bad items were skipped")
+
+
+def _show_remote(traceback: str) -> None:
+    if traceback and click.get_current_context().find_root().params.get("debug"):
+        click.echo(traceback, err=True)
+
+
+Write = Callable[[str, bytes], None]
+
+
+def _single(output: str | None) -> bool:
+    return output is not None and Path(output).suffix.lower() == ".json"
+
+
+def is_folder(output: str) -> bool:
+    """Tell whether an output path means a folder: it is one, ends in a slash, or has no suffix."""
+    return output.endswith("/") or Path(output).is_dir() or not Path(output).suffix
+
+
+@contextmanager
+def open_sink(output: str | None, suffix: str = ".json") -> Iterator[Write]:
+    """Open what takes the results: standard output, one file, or a folder with a file an item."""
+    if output is None or output == "-":
+        yield _to_stdout
+        sys.stdout.buffer.flush()
+    elif is_folder(output):
+        yield _to_folder(Path(output), suffix)
+    else:
+        with atomic_file(Path(output)) as file:
+            yield _to_file(file, output)
+
+
+def _to_stdout(_: str, data: bytes) -> None:
+    sys.stdout.buffer.write(data)
+    sys.stdout.buffer.flush()
+
+
+def _to_file(file: BinaryIO, output: str) -> Write:
+    count = 0
+
+    def write(_: str, data: bytes) -> None:
+        nonlocal count
+        count += 1
+        if count > 1 and _single(output):
+            raise OutputFailed(f"{output}: several artifacts; name a .jsonl file or a folder")
+        file.write(data)
+
+    return write
+
+
+def _to_folder(folder: Path, suffix: str) -> Write:
+    seen: set[str] = set()
+
+    def write(identity: str, data: bytes) -> None:
+        name = file_name(identity) + suffix
+        if name in seen:
+            raise InvalidInput(f"id {identity!r} stands twice; expected unique ids in a folder")
+        seen.add(name)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputFailed(f"{folder}: cannot be made: {error.strerror}") from error
+        write_bytes(folder / name, data)
+
+    return write
+
+
+def file_name(identity: str) -> str:
+    """Return a file name for an item's id: what could leave the folder is replaced."""
+    safe = "".join(c if c.isalnum() or c in "-_.+@" else "_" for c in identity)
+    return safe.lstrip(".") or "_"
+
+
+def write_result(artifact: Any, output: str | None) -> None:
+    """Write the only result of a stage."""
+    document = encode(artifact)
+    with open_sink(output) as write:
+        write(artifact.id, dump_document(document) if _single(output) else dump_line(document))

@@ -1,0 +1,1 @@
+"""What is on disk: one frozen dataclass tree per artifact, their schemas, reading and writing."""

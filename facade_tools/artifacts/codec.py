@@ -1,0 +1,121 @@
+"""Between plain JSON data and the artifacts' dataclasses.
+
+Decoders and encoders are derived once from a class's annotations. They trust their input:
+the schema has been checked before (`store.py`), so no type is checked twice.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import types
+import typing
+from collections.abc import Callable, Mapping
+from functools import cache
+from typing import Any, TypeVar, Union, get_args, get_origin
+
+from .numbers import Given
+
+T = TypeVar("T")
+Convert = Callable[[Any], Any]
+
+_PLAIN = (float, int, str, bool, Given, type(None))
+
+
+def from_json(cls: type[T], document: Mapping[str, Any]) -> T:
+    """Build the dataclass `cls` from schema-checked JSON data.
+
+    Keys that are no field are ignored; null stands for the field's default.
+    """
+    return _object_decoder(cls)(document)  # type: ignore[no-any-return]
+
+
+def to_json(value: Any) -> Any:
+    """Return plain JSON data of a dataclass tree; fields equal to their default are left out.
+
+    A field whose metadata holds `keep` is written even then.
+    """
+    kind = type(value)
+    if kind in _PLAIN:
+        return value
+    if kind is tuple or kind is list:
+        return [to_json(item) for item in value]
+    if kind is dict:
+        return {key: to_json(item) for key, item in value.items()}
+    if dataclasses.is_dataclass(value):
+        return _object_encoder(kind)(value)
+    return value
+
+
+@cache
+def _object_encoder(cls: type[Any]) -> Convert:
+    rows = [
+        (field.name, field.default, bool(field.metadata.get("keep")))
+        for field in dataclasses.fields(cls)
+    ]
+    empty = {
+        field.name: field.default_factory()
+        for field in dataclasses.fields(cls)
+        if field.default_factory is not dataclasses.MISSING
+    }
+
+    def encode(value: Any) -> dict[str, Any]:
+        out: dict[str, Any] = {}
+        for name, default, keep in rows:
+            item = getattr(value, name)
+            if keep or (item is not default and item != empty.get(name, default)):
+                out[name] = to_json(item)
+        return out
+
+    return encode
+
+
+@cache
+def _object_decoder(cls: type[Any]) -> Convert:
+    hints = typing.get_type_hints(cls)
+    fields = [field for field in dataclasses.fields(cls) if field.init]
+    decoders = {field.name: _decoder(hints[field.name]) for field in fields}
+    plain = frozenset(name for name, decode in decoders.items() if decode is None)
+    nested = {name: decode for name, decode in decoders.items() if decode is not None}
+    known = frozenset(decoders)
+
+    def decode(document: Mapping[str, Any]) -> Any:
+        values = {name: item for name, item in document.items() if name in plain}
+        if len(values) < len(document):
+            for name, item in document.items():
+                if name in nested and item is not None:
+                    values[name] = nested[name](item)
+        return cls(**values)
+
+    return decode if known else lambda _: cls()
+
+
+def _decoder(hint: Any) -> Convert | None:
+    """Return the converter of one annotation, or None where JSON data passes as it is."""
+    origin = get_origin(hint)
+    if dataclasses.is_dataclass(hint):
+        return _object_decoder(typing.cast("type[Any]", hint))
+    if origin in (Union, types.UnionType):
+        return _optional_decoder(hint)
+    if origin is tuple:
+        return _tuple_decoder(get_args(hint))
+    if origin in (dict, Mapping) or (isinstance(origin, type) and issubclass(origin, Mapping)):
+        return _mapping_decoder(get_args(hint)[1])
+    return None
+
+
+def _optional_decoder(hint: Any) -> Convert | None:
+    (inner,) = (arg for arg in get_args(hint) if arg is not type(None))
+    decode = _decoder(inner)
+    return None if decode is None else lambda item: None if item is None else decode(item)
+
+
+def _tuple_decoder(arguments: tuple[Any, ...]) -> Convert:
+    decode = _decoder(arguments[0])
+    return tuple if decode is None else lambda items: tuple(map(decode, items))
+
+
+def _mapping_decoder(value_hint: Any) -> Convert:
+    decode = _decoder(value_hint)
+    if decode is None:
+        return dict
+    return lambda items: {key: decode(item) for key, item in items.items()}

@@ -1,0 +1,126 @@
+"""Text to plain JSON data and back to typed artifacts."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from functools import cache
+from importlib import import_module
+from typing import Any, Protocol
+
+from ..errors import InvalidInput, Place
+from .codec import from_json, to_json
+from .numbers import parse_float
+from .validation import check
+
+# Kind of artifact -> module and class. The modules load when an artifact of the kind does.
+KINDS: dict[str, str] = {
+    "attributes": "attributes:Attributes",
+    "blocks": "blocks:Blocks",
+    "building": "building:Building",
+    "footprint": "footprint:Footprint",
+}
+
+MAX_YAML_BYTES = 4 << 20
+
+
+class Artifact(Protocol):
+    """What every artifact has: the kind (its class's name on disk)."""
+
+    kind: Any
+
+
+def parse_json(data: bytes) -> Any:
+    """Return the JSON value of `data` (UTF-8). Raises InvalidInput with the line of an error."""
+    try:
+        text = data.decode("utf-8-sig")
+        return json.loads(text, parse_float=parse_float, parse_constant=_refuse_constant)
+    except json.JSONDecodeError as error:
+        line = error.lineno if text.count("\n") > 1 else None
+        at = f"column {error.colno}"
+        raise InvalidInput(f"not valid JSON: {error.msg} ({at})", Place(line=line)) from None
+    except UnicodeDecodeError as error:
+        raise InvalidInput(f"not UTF-8 text (byte {error.start}); expected JSON") from None
+    except RecursionError:
+        raise InvalidInput("nested too deeply; expected an artifact") from None
+    except ValueError as error:
+        raise InvalidInput(f"not valid JSON: {error}") from None
+
+
+def _refuse_constant(name: str) -> float:
+    raise InvalidInput(f"{name} is not a JSON number; expected a finite number or null")
+
+
+def parse_yaml(data: bytes) -> Any:
+    """Return the value of hand-written YAML; aliases and duplicate keys are refused."""
+    import yaml
+
+    if len(data) > MAX_YAML_BYTES:
+        raise InvalidInput(f"larger than {MAX_YAML_BYTES >> 20} MiB; expected a hand-written file")
+    try:
+        return yaml.load(data, Loader=_yaml_loader())
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark
+        place = Place(line=None if mark is None else mark.line + 1)
+        raise InvalidInput(f"not valid YAML: {error.problem}", place) from None
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        raise InvalidInput(f"not valid YAML: {error}".split("\n")[0]) from None
+
+
+@cache
+def _yaml_loader() -> Any:
+    import yaml
+
+    class Loader(yaml.SafeLoader):
+        """Safe loader without aliases (a few bytes of which fill any memory)."""
+
+        def compose_node(self, parent: Any, index: Any) -> Any:
+            if self.check_event(yaml.AliasEvent):
+                event = self.peek_event()
+                raise yaml.MarkedYAMLError(None, None, "aliases are refused", event.start_mark)
+            return super().compose_node(parent, index)
+
+        def construct_mapping(self, node: Any, deep: bool = False) -> Any:
+            keys = [key.value for key, _ in node.value]
+            for (key, _), name in zip(node.value, keys, strict=True):
+                if keys.count(name) > 1:
+                    problem = f"key {name!r} stands twice"
+                    raise yaml.MarkedYAMLError(None, None, problem, key.start_mark)
+            return super().construct_mapping(node, deep)
+
+    return Loader
+
+
+def artifact_class(kind: str) -> type[Any]:
+    """Return the dataclass of a kind of artifact."""
+    module, name = KINDS[kind].split(":")
+    cls: type[Any] = getattr(import_module(f".{module}", __package__), name)
+    return cls
+
+
+def kind_of(document: Any, expected: tuple[str, ...]) -> str:
+    """Return the artifact kind of `document`; raises InvalidInput unless it is `expected`."""
+    wanted = " or ".join(f"facade-tools/{kind}/1" for kind in expected)
+    if not isinstance(document, dict):
+        found = type(document).__name__
+        raise InvalidInput(f"is a JSON {found}; expected an object with schema {wanted}")
+    schema = document.get("schema")
+    if schema is None:
+        raise InvalidInput(f'has no "schema"; expected {wanted}', pointer="/schema")
+    for kind in expected:
+        if schema == f"facade-tools/{kind}/1":
+            return kind
+    raise InvalidInput(f"is {str(schema)[:80]!r}; expected {wanted}", pointer="/schema")
+
+
+def decode(document: Any, *expected: str) -> Any:
+    """Return the typed artifact of schema-checked `document`, one of the kinds `expected`."""
+    kind = kind_of(document, expected or tuple(KINDS))
+    check(document, kind)
+    return from_json(artifact_class(kind), document)
+
+
+def encode(artifact: Artifact) -> dict[str, Any]:
+    """Return plain JSON data of an artifact, its `schema` first."""
+    body: Mapping[str, Any] = to_json(artifact)
+    return {"schema": f"facade-tools/{artifact.kind}/1", **body}

@@ -1,0 +1,1 @@
+"""FW16: attributes, graphical model, mass models and facades of residential buildings."""

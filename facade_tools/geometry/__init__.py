@@ -1,0 +1,1 @@
+"""Pure arrays: box unions, polygons, facade pieces, straight skeletons, roofs, solids."""

@@ -1,0 +1,1 @@
+"""Split rules and derivation trees, shared by both facade parsers."""

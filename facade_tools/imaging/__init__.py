@@ -1,0 +1,1 @@
+"""Homographies, rectification, pixel features and rendered previews."""

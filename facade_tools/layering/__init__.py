@@ -1,0 +1,1 @@
+"""IMAW15: facades designed as a stack of layers."""

@@ -1,0 +1,1 @@
+"""TSKP10: pixel classifier and shape-grammar parsing of rectified photographs."""

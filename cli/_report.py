@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import click
 
-from ..errors import FacadeError
+from facade_tools.errors import FacadeError
 
 LOGGER = "facade_tools"
 PATIENCE = 1.0  # seconds before a bar appears

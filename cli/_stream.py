@@ -11,14 +11,15 @@ from typing import Any, BinaryIO
 
 import click
 
-from ..artifacts.documents import encode
-from ..artifacts.numbers import dump_document, dump_line
-from ..artifacts.provenance import Provenance, Source
-from ..artifacts.store import RawItem, digest, read_raw
-from ..artifacts.writing import atomic_file, write_bytes
-from ..errors import FacadeError, InvalidInput, OutputFailed
-from ..parallel import map_ordered
-from ..randomness import item_generator
+from facade_tools.artifacts.documents import encode
+from facade_tools.artifacts.numbers import dump_document, dump_line
+from facade_tools.artifacts.provenance import Provenance, Source
+from facade_tools.artifacts.store import RawItem, digest, read_raw
+from facade_tools.artifacts.writing import atomic_file, write_bytes
+from facade_tools.errors import FacadeError, InvalidInput, OutputFailed
+from facade_tools.parallel import map_ordered
+from facade_tools.randomness import item_generator
+
 from ._options import StreamOptions
 from ._report import Progress, say_error
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeVar
+from typing import TypeVar, cast
 
 import numba
 
@@ -15,4 +15,5 @@ def compiled(function: F) -> F:
 
     The plain version stays reachable as `function.py_func`, which the tests use as oracle.
     """
-    return numba.njit(cache=True, fastmath=False, nogil=True, error_model="numpy")(function)  # type: ignore[no-any-return]
+    compile_ = numba.njit(cache=True, fastmath=False, nogil=True, error_model="numpy")
+    return cast("F", compile_(function))

@@ -198,7 +198,7 @@ def _take(stream: Iterator[T], size: int, failure: list[Exception]) -> list[T]:
     chunk: list[T] = []
     try:
         for item in islice(stream, size):
-            chunk.append(item)  # noqa: PERF402 (an exception must not lose the items before it)
+            chunk.append(item)
     except Exception as error:
         failure.append(error)
     return chunk

@@ -47,7 +47,7 @@ def to_json(value: Any) -> Any:
 
 
 @cache
-def _object_encoder(cls: type[Any]) -> Convert:
+def _object_encoder(cls: Any) -> Convert:
     rows = [
         (field.name, field.default, bool(field.metadata.get("keep")))
         for field in dataclasses.fields(cls)
@@ -70,7 +70,7 @@ def _object_encoder(cls: type[Any]) -> Convert:
 
 
 @cache
-def _object_decoder(cls: type[Any]) -> Convert:
+def _object_decoder(cls: Any) -> Convert:
     hints = typing.get_type_hints(cls)
     fields = [field for field in dataclasses.fields(cls) if field.init]
     decoders = {field.name: _decoder(hints[field.name]) for field in fields}
@@ -93,7 +93,7 @@ def _decoder(hint: Any) -> Convert | None:
     """Return the converter of one annotation, or None where JSON data passes as it is."""
     origin = get_origin(hint)
     if dataclasses.is_dataclass(hint):
-        return _object_decoder(typing.cast("type[Any]", hint))
+        return _object_decoder(hint)
     if origin in (Union, types.UnionType):
         return _optional_decoder(hint)
     if origin is tuple:

@@ -76,7 +76,7 @@ def _yaml_loader() -> Any:
 
         def compose_node(self, parent: Any, index: Any) -> Any:
             if self.check_event(yaml.AliasEvent):
-                event = self.peek_event()
+                event: Any = self.get_event()
                 raise yaml.MarkedYAMLError(None, None, "aliases are refused", event.start_mark)
             return super().compose_node(parent, index)
 

@@ -26,7 +26,8 @@ def from_json(cls: type[T], document: Mapping[str, Any]) -> T:
 
     Keys that are no field are ignored; null stands for the field's default.
     """
-    return _object_decoder(cls)(document)  # type: ignore[no-any-return]
+    decoder = _object_decoder(typing.cast("Any", cls))
+    return decoder(document)  # type: ignore[no-any-return]
 
 
 def to_json(value: Any) -> Any:
@@ -34,7 +35,7 @@ def to_json(value: Any) -> Any:
 
     A field whose metadata holds `keep` is written even then.
     """
-    kind = type(value)
+    kind: Any = type(value)
     if kind in _PLAIN:
         return value
     if kind is tuple or kind is list:
@@ -93,7 +94,7 @@ def _decoder(hint: Any) -> Convert | None:
     """Return the converter of one annotation, or None where JSON data passes as it is."""
     origin = get_origin(hint)
     if dataclasses.is_dataclass(hint):
-        return _object_decoder(hint)
+        return _object_decoder(typing.cast("Any", hint))
     if origin in (Union, types.UnionType):
         return _optional_decoder(hint)
     if origin is tuple:

@@ -1,0 +1,163 @@
+"""What stands in the way of windows: roofs of lower boxes, porch roofs and porch posts.
+
+All rectangles lie in a facade piece's frame: u to the right as seen from outside, v up, metres.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..artifacts.building import Box, Building, Piece, Side
+from .arrays import Floats, Points2, Rectangles
+from .boxes import box_rectangles
+from .floors import mass_boxes
+
+POST_SPACING = 3.6  # longest free span between two posts of a porch (m)
+POST_INSET = 0.1  # from the porch's edge to the middle of a post (m)
+POST_HALF = 0.1  # half a post's thickness with a little air (m)
+STRIP = 0.25  # a sloping roof line is covered by strips of at most this width (m)
+OUTSIDE = 0.02  # how far in front of the wall the roofs are cut (m)
+UNDER = 0.12  # thickness of a roof below its eaves (m)
+OVER = 0.05  # air above a roof (m)
+NEAR = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class Wall:
+    """The line of a piece in plan: start and unit direction along u, unit normal outwards."""
+
+    start: tuple[float, float]
+    along: tuple[float, float]
+    outwards: tuple[float, float]
+
+
+_DIRECTIONS: dict[Side, tuple[tuple[float, float], tuple[float, float]]] = {
+    "front": ((1.0, 0.0), (0.0, -1.0)),
+    "back": ((-1.0, 0.0), (0.0, 1.0)),
+    "left": ((0.0, -1.0), (-1.0, 0.0)),
+    "right": ((0.0, 1.0), (1.0, 0.0)),
+}
+
+
+def wall_of(side: Side, piece: Piece) -> Wall:
+    """Return the plan line of a piece of `side`."""
+    along, outwards = _DIRECTIONS[side]
+    return Wall((piece.origin[0], piece.origin[1]), along, outwards)
+
+
+def blocked_rectangles(building: Building, side: Side, piece: Piece) -> Rectangles:
+    """Return the parts (n, 4) of a piece where no element may be: u0, v0, u1, v1, metres.
+
+    Roofs of other boxes that meet the wall (a sloping line as strips), porch roofs, and the wall
+    right behind a porch post. Rectangles may stick out of the piece.
+    """
+    wall = wall_of(side, piece)
+    rows = [row for box in building.boxes for row in _roof_strips(box, wall, piece)]
+    porches = [box for box in building.boxes if box.kind == "porch"]
+    rows += [row for porch in porches for row in _post_strips(building, porch, wall, piece)]
+    return np.array(rows, dtype=np.float64).reshape(-1, 4)
+
+
+def roof_height(box: Box, points: Points2) -> Floats:
+    """Return the height (m) of a box's roof over plan points (n, 2); NaN beyond its overhang.
+
+    Cones are taken as pyramids and mansards as hips of at least 60°: never lower than built.
+    """
+    roof, eaves = box.roof, box.height or 0.0
+    if roof is None:
+        return np.full(len(points), np.nan)
+    dx = box.width / 2 - np.abs(points[:, 0] - box.x)
+    dy = box.depth / 2 - np.abs(points[:, 1] - box.y)
+    slope = float(np.tan(np.radians(max(roof.pitch, 60.0 if roof.style == "mansard" else 0.0))))
+    if roof.style == "flat":
+        rise = np.zeros(len(points))
+    elif roof.style == "gable":
+        rise = slope * (dy if roof.direction == "x" else dx)
+    elif roof.style == "shed":
+        rise = slope * (points - [box.x - box.width / 2, box.y - box.depth / 2]) @ _axis(box)
+    else:
+        rise = slope * np.minimum(dx, dy)
+    inside = np.minimum(dx, dy) >= -roof.overhang - NEAR
+    return np.where(inside, eaves + rise, np.nan)
+
+
+def _axis(box: Box) -> Floats:
+    falls_along_y = box.roof is not None and box.roof.direction == "y"
+    return np.array([0.0, 1.0] if falls_along_y else [1.0, 0.0])
+
+
+def _roof_strips(box: Box, wall: Wall, piece: Piece) -> Iterator[tuple[float, ...]]:
+    """Yield the strips of a piece that the roof of `box` covers."""
+    bottom, top = piece.origin[2], piece.origin[2] + piece.height
+    if box.roof is None or box.height is None or not bottom - 1.0 < box.height < top - NEAR:
+        return
+    if not _line_meets(box, wall, piece):
+        return
+    count = max(int(np.ceil(piece.width / STRIP)), 1)
+    us = np.linspace(0.0, piece.width, 2 * count + 1)
+    at = np.array(wall.start) + OUTSIDE * np.array(wall.outwards)
+    heights = roof_height(box, at + us[:, None] * np.array(wall.along))
+    for k in range(count):
+        part = heights[2 * k : 2 * k + 3]
+        if not np.isnan(part).all():
+            high, low = float(np.nanmax(part)), min(float(np.nanmin(part)), box.height)
+            yield us[2 * k], low - UNDER - bottom, us[2 * k + 2], high + OVER - bottom
+
+
+def _line_meets(box: Box, wall: Wall, piece: Piece) -> bool:
+    """Tell whether a piece's line, just outside, passes under or over the roof's plan."""
+    overhang = 0.0 if box.roof is None else box.roof.overhang
+    ends = np.array([wall.start, wall.start]) + OUTSIDE * np.array(wall.outwards)
+    ends[1] += piece.width * np.array(wall.along)
+    low, high = ends.min(axis=0), ends.max(axis=0)
+    reach = np.array([box.width / 2 + overhang, box.depth / 2 + overhang])
+    centre = np.array([box.x, box.y])
+    return bool((low < centre + reach).all() and (high > centre - reach).all())
+
+
+def porch_posts(building: Building, porch: Box) -> Points2:
+    """Return the plan centres (n, 2) of a porch's posts, metres.
+
+    Posts stand at its corners and at most 3.6 m apart along its edges (an odd number of bays, so
+    that the middle is free), wherever that is at least 0.3 m clear of the mass.
+    """
+    x0, y0, x1, y1 = box_rectangles([porch])[0]
+    xs = _spread(x0 + POST_INSET, x1 - POST_INSET)
+    ys = _spread(y0 + POST_INSET, y1 - POST_INSET)
+    rim = [(x, y) for x in xs for y in ys if x in (xs[0], xs[-1]) or y in (ys[0], ys[-1])]
+    solid = box_rectangles(mass_boxes(building))
+    return np.array([p for p in rim if _clear(p, solid, 0.3)], dtype=np.float64).reshape(-1, 2)
+
+
+def _spread(low: float, high: float) -> list[float]:
+    count = max(int(np.ceil((high - low) / POST_SPACING - NEAR)), 1)
+    return [float(value) for value in np.linspace(low, max(high, low), count + 1)]
+
+
+def _clear(point: tuple[float, float], solid: Rectangles, distance: float) -> bool:
+    x, y = point
+    gap_x = np.maximum(solid[:, 0] - x, x - solid[:, 2])
+    gap_y = np.maximum(solid[:, 1] - y, y - solid[:, 3])
+    return bool((np.maximum(gap_x, gap_y) >= distance).all())
+
+
+def _post_strips(
+    building: Building, porch: Box, wall: Wall, piece: Piece
+) -> Iterator[tuple[float, ...]]:
+    """Yield the strips of a piece right behind the posts of a porch that touches its wall."""
+    eaves, bottom = porch.height or 0.0, piece.origin[2]
+    if bottom >= eaves - NEAR or not _line_meets(porch, wall, piece):
+        return
+    for u, out in _in_frame(porch_posts(building, porch), wall):
+        reach = abs(wall.outwards[0]) * porch.width + abs(wall.outwards[1]) * porch.depth
+        if 0 < out <= reach and -POST_HALF < u < piece.width + POST_HALF:
+            yield u - POST_HALF, -bottom, u + POST_HALF, eaves - bottom
+
+
+def _in_frame(points: Points2, wall: Wall) -> Iterable[tuple[float, float]]:
+    offsets = points - np.array(wall.start)
+    along, out = offsets @ np.array(wall.along), offsets @ np.array(wall.outwards)
+    return [(float(u), float(d)) for u, d in zip(along, out, strict=True)]

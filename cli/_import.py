@@ -1,0 +1,90 @@
+"""Running `facade import`: records in order through the importer, rules counted at the end."""
+
+from __future__ import annotations
+
+import logging
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+from facade_tools.errors import FacadeError, InvalidInput
+from facade_tools.formats.importing import Importer, Written, items
+from facade_tools.formats.reading import ReadOptions
+from facade_tools.parallel import Outcome, map_ordered
+
+from ._options import StreamOptions
+from ._report import Progress, say_error
+from ._stream import Write, open_sink
+
+logger = logging.getLogger("facade_tools.import")
+
+
+def run_import(options: ReadOptions, stream: StreamOptions) -> None:
+    """Import all inputs; raises the first error, or after --on-error skip the last."""
+    importer = Importer(options, _recorded(options), _converter(options))
+    outcomes = map_ordered(
+        importer, items(stream.inputs, options), jobs=stream.jobs, scheduler=stream.scheduler
+    )
+    tally = _Tally(stream.on_error == "skip")
+    progress = Progress("import")
+    with open_sink(stream.output) as write:
+        for outcome in outcomes:
+            tally.take(outcome, write)
+            progress.advance()
+        progress.close()
+    tally.report()
+    if tally.refused:
+        raise InvalidInput(f"{tally.refused} bad items were skipped")
+
+
+def _recorded(options: ReadOptions) -> dict[str, Any]:
+    said = {"as": options.kind, "metres": options.metres, "columns": options.columns}
+    return {"front": options.front, **{name: value for name, value in said.items() if value}}
+
+
+def _converter(options: ReadOptions) -> Callable[[Any], Any] | None:
+    if options.kind != "attributes":
+        return None
+    from facade_tools.exteriors.attributes import building_attributes
+
+    return building_attributes
+
+
+class _Tally:
+    """Writes what was read, and counts it, what was refused and which rules were applied."""
+
+    def __init__(self, skip: bool) -> None:
+        """Start at nothing; `skip` goes on after a bad item."""
+        self.skip = skip
+        self.kinds: Counter[str] = Counter()
+        self.notes: Counter[str] = Counter()
+        self.refused = 0
+        self.seen: set[str] = set()
+
+    def take(self, outcome: Outcome[Written], write: Write) -> None:
+        """Write one item's artifacts, or report its error."""
+        if outcome.value is None:
+            self._refuse(outcome.error or InvalidInput("cannot be read"))
+            return
+        for identity, data in outcome.value.rows:
+            if identity in self.seen:
+                self._refuse(InvalidInput(f"id {identity!r} stands twice; expected unique ids"))
+                continue
+            self.seen.add(identity)
+            write(identity, data)
+        self.kinds += outcome.value.kinds
+        self.notes += outcome.value.notes
+
+    def _refuse(self, error: Exception) -> None:
+        if not self.skip or not isinstance(error, FacadeError):
+            raise error
+        say_error("import", error)
+        self.refused += 1
+
+    def report(self) -> None:
+        """Log what was read and every rule that was applied, with its count."""
+        read = ", ".join(f"{count} {kind}" for kind, count in sorted(self.kinds.items()))
+        level = logging.WARNING if self.notes or self.refused else logging.INFO
+        logger.log(level, "import: read %s; refused %d", read or "nothing", self.refused)
+        for note, count in sorted(self.notes.items()):
+            logger.warning("import: %d × %s", count, note)

@@ -1,0 +1,149 @@
+"""From files of any public format to artifacts, one record at a time."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from ..artifacts.documents import encode
+from ..artifacts.numbers import dump_line
+from ..artifacts.provenance import Provenance, Source
+from ..artifacts.store import unreadable
+from ..errors import InvalidInput, Place
+from .detect import Format, detect
+from .reading import HEAD_BYTES, Imported, ReadOptions, Record
+
+SPOOL_BYTES = 64 << 20  # of standard input in memory; what is longer waits on disk
+
+KIND_OF = {"buildings": "building", "attributes": "attributes", "footprints": "footprint"}
+
+
+@dataclass(frozen=True, slots=True)
+class Item:
+    """A record, where it comes from, and its format; or the error of a file that has none."""
+
+    source: Source
+    format: Format | None
+    record: Record | None
+    error: InvalidInput | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """The artifacts of one item, encoded, with the rules that were applied, counted."""
+
+    rows: tuple[tuple[str, bytes], ...]
+    kinds: Counter[str] = field(default_factory=Counter)
+    notes: Counter[str] = field(default_factory=Counter)
+
+
+def items(paths: Iterable[str], options: ReadOptions) -> Iterator[Item]:
+    """Yield the records of files, folders and `-`, in order, in bounded memory.
+
+    What cannot be read becomes an item with its error, and the next file follows.
+    """
+    for path in paths:
+        for file in _files(path):
+            source = Source("-" if file == "-" else Path(file).name, "")
+            try:
+                with _opened(file) as stream:
+                    yield from _records(stream, source, options)
+            except InvalidInput as error:
+                yield Item(source, None, None, error.at(file))
+
+
+def _files(path: str) -> list[str]:
+    place = Path(path)
+    if path == "-" or not place.is_dir():
+        return [path]
+    return [
+        str(entry)
+        for entry in sorted(place.iterdir())
+        if entry.is_file() and not entry.name.startswith(".")
+    ]
+
+
+@contextmanager
+def _opened(path: str) -> Iterator[BinaryIO]:
+    """Open a file for reading from any place in it; standard input is spooled first."""
+    if path == "-":
+        with tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
+            shutil.copyfileobj(sys.stdin.buffer, spool)
+            spool.seek(0)
+            yield spool  # type: ignore[misc]
+        return
+    try:
+        with Path(path).open("rb") as stream:
+            yield stream
+    except OSError as error:
+        raise unreadable(path, error) from None
+
+
+def _records(stream: BinaryIO, source: Source, options: ReadOptions) -> Iterator[Item]:
+    found = detect(stream.read(HEAD_BYTES))
+    stream.seek(0)
+    whole: Source | None = None
+    for record in found.records(stream, options):
+        if record.data is not None:
+            digest = hashlib.sha256(record.data).hexdigest()
+            yield Item(replace(source, sha256=digest), found, record)
+            continue
+        if whole is None:
+            whole = replace(source, sha256=_digest(stream))
+        yield Item(whole, found, record)
+
+
+def _digest(stream: BinaryIO) -> str:
+    """Return the digest of the whole file; the reading place stays where it is."""
+    place = stream.tell()
+    stream.seek(0)
+    running = hashlib.sha256()
+    while block := stream.read(1 << 20):
+        running.update(block)
+    stream.seek(place)
+    return running.hexdigest()
+
+
+@dataclass(frozen=True, slots=True)
+class Importer:
+    """Turns an item into encoded artifacts, in any process.
+
+    recorded: the options that the provenance names. convert: what to make of a building where
+    attributes are asked for.
+    """
+
+    options: ReadOptions
+    recorded: Mapping[str, Any]
+    convert: Callable[[Any], Imported] | None = None
+
+    def __call__(self, item: Item) -> Written:
+        """Return the artifacts of `item`; raises InvalidInput with file, line and pointer."""
+        if item.error is not None or item.format is None or item.record is None:
+            raise item.error or InvalidInput("cannot be read")
+        record = item.record
+        try:
+            built = item.format.build(record, self.options)
+            artifacts = [self._asked(artifact) for artifact in built.artifacts]
+        except InvalidInput as error:
+            place = Place(item.source.name, record.line, record.pointer or error.place.pointer)
+            raise InvalidInput(error.message, place) from None
+        provenance = Provenance("import", None, self.recorded, (item.source,))
+        rows = [(a.id, dump_line(encode(replace(a, provenance=provenance)))) for a in artifacts]
+        return Written(tuple(rows), Counter(a.kind for a in artifacts), built.notes)
+
+    def _asked(self, artifact: Imported) -> Any:
+        """Return what --as asks for; raises InvalidInput where the source does not give it."""
+        kind = self.options.kind
+        if kind is None or artifact.kind == KIND_OF[kind]:
+            return artifact
+        if kind == "attributes" and artifact.kind == "building" and self.convert is not None:
+            return self.convert(artifact)
+        raise InvalidInput(f"gives {artifact.kind}, not {kind}; leave --as out")

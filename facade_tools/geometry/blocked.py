@@ -52,7 +52,7 @@ def blocked_rectangles(building: Building, side: Side, piece: Piece) -> Rectangl
     """Return the parts (n, 4) of a piece where no element may be: u0, v0, u1, v1, metres.
 
     Roofs of other boxes that meet the wall (a sloping line as strips), porch roofs, and the wall
-    right behind a porch post. Rectangles may stick out of the piece.
+    right behind a porch post. Rectangles may stick out of the piece, and overlap.
     """
     wall = wall_of(side, piece)
     rows = [row for box in building.boxes for row in _roof_strips(box, wall, piece)]
@@ -104,7 +104,8 @@ def _roof_strips(box: Box, wall: Wall, piece: Piece) -> Iterator[tuple[float, ..
         part = heights[2 * k : 2 * k + 3]
         if not np.isnan(part).all():
             high, low = float(np.nanmax(part)), min(float(np.nanmin(part)), box.height)
-            yield us[2 * k], low - UNDER - bottom, us[2 * k + 2], high + OVER - bottom
+            if high + OVER > bottom and low - UNDER < top:
+                yield us[2 * k], low - UNDER - bottom, us[2 * k + 2], high + OVER - bottom
 
 
 def _line_meets(box: Box, wall: Wall, piece: Piece) -> bool:

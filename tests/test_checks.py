@@ -1,0 +1,188 @@
+"""The rules of facade geometry: good houses pass, every planted fault is found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from facade_tools.artifacts.building import Box, Building, Element, Facade, Piece, Roof, Side
+from facade_tools.artifacts.store import read
+from facade_tools.geometry.blocked import blocked_rectangles, porch_posts, roof_height
+from facade_tools.geometry.checks import Problem, building_problems
+from facade_tools.geometry.pieces import facade_pieces
+
+SAMPLES = Path(__file__).parent.parent / "sample_data"
+GABLE = Roof("gable", 30, "x", 0.4)
+DOOR = Element("door", "panel", 1.0, 0.0, 0.9, 2.1, main=True)
+WINDOW = Element("window", "sash", 4.0, 0.9, 1.0, 1.4)
+
+
+def house(*extra: Box, front: tuple[Element, ...] = (DOOR, WINDOW)) -> Building:
+    """A two-storey box with a door and a window in its first front piece."""
+    main = Box("main", "general", 5, 4, 10, 8, 6, GABLE)
+    bare = Building("h", (main, *extra))
+    facades: dict[Side, Facade] = {
+        side: Facade(pieces) for side, pieces in facade_pieces(bare).items()
+    }
+    first, *others = facades["front"].pieces
+    facades["front"] = Facade((replace(first, elements=front), *others))
+    return replace(bare, facades=facades)
+
+
+def problems(building: Building) -> list[Problem]:
+    return list(building_problems(building))
+
+
+def with_front(building: Building, change: Callable[[Piece], Piece]) -> Building:
+    first, *others = building.facades["front"].pieces
+    front = Facade((change(first), *others))
+    return replace(building, facades={**building.facades, "front": front})
+
+
+def test_sample_houses_and_partials_break_no_rule() -> None:
+    for building in read([str(SAMPLES / "houses"), str(SAMPLES / "partial")], "building"):
+        assert problems(building) == []
+
+
+def test_plain_house_is_sound() -> None:
+    assert problems(house()) == []
+
+
+def test_mass_without_facades_is_sound() -> None:
+    assert problems(replace(house(), facades={})) == []
+
+
+FAULTS: dict[str, tuple[Callable[[Building], Building], str, str]] = {
+    "no general box": (
+        lambda b: replace(b, boxes=(replace(b.boxes[0], kind="garage"),), facades={}),
+        "/boxes",
+        "general",
+    ),
+    "low box": (
+        lambda b: replace(b, boxes=(replace(b.boxes[0], height=1.5),), facades={}),
+        "/boxes/0/height",
+        "half a storey",
+    ),
+    "box id twice": (
+        lambda b: replace(b, boxes=b.boxes * 2),
+        "/boxes/1/id",
+        "twice",
+    ),
+    "piece id twice": (
+        lambda b: with_front(b, lambda p: replace(p, id="front-2")),
+        "/facades/front/pieces/1/id",
+        "twice",
+    ),
+    "piece of no box": (
+        lambda b: with_front(b, lambda p: replace(p, box="nowhere")),
+        "/facades/front/pieces/0/box",
+        "nowhere",
+    ),
+    "wrong wall": (
+        lambda b: with_front(b, lambda p: replace(p, width=9.9)),
+        "/facades/front/pieces/0",
+        "no exterior wall",
+    ),
+    "missing wall": (
+        lambda b: replace(b, facades={**b.facades, "left": Facade(())}),
+        "/facades/left/pieces",
+        "missing",
+    ),
+    "outside": (
+        lambda b: with_front(b, lambda p: replace(p, elements=(DOOR, replace(WINDOW, u=9.5)))),
+        "/facades/front/pieces/0/elements/1",
+        "border",
+    ),
+    "overlap": (
+        lambda b: with_front(b, lambda p: replace(p, elements=(DOOR, replace(WINDOW, u=1.5)))),
+        "/facades/front/pieces/0/elements/1",
+        "overlaps",
+    ),
+    "no main door": (
+        lambda b: with_front(b, lambda p: replace(p, elements=(WINDOW,))),
+        "/facades",
+        "0 main doors",
+    ),
+    "two main doors": (
+        lambda b: with_front(b, lambda p: replace(p, elements=(DOOR, replace(DOOR, u=6.0)))),
+        "/facades",
+        "2 main doors",
+    ),
+    "hanging door": (
+        lambda b: with_front(b, lambda p: replace(p, elements=(replace(DOOR, v=0.6),))),
+        "/facades/front/pieces/0/elements/0",
+        "hangs",
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_planted_fault_is_found(fault: str) -> None:
+    plant, pointer, words = FAULTS[fault]
+    found = problems(plant(house()))
+    assert any(p.pointer == pointer and words in p.message for p in found), found
+
+
+def test_window_in_front_of_a_lower_roof_is_found() -> None:
+    lean = Box("lean", "general", 12, 4, 4, 6, 2.8, Roof("gable", 45, "x", 0.3))
+    sound = house(lean)
+    upper = next(p for p in sound.facades["right"].pieces if p.origin[2] >= 3 and p.box == "main")
+    over_ridge = Element("window", "sash", upper.width / 2 - 0.5, 0.9, 1.0, 1.4)
+    pieces = tuple(
+        replace(p, elements=(over_ridge,)) if p is upper else p
+        for p in sound.facades["right"].pieces
+    )
+    broken = replace(sound, facades={**sound.facades, "right": Facade(pieces)})
+    assert [p.message for p in problems(broken) if "roof" in p.message]
+
+
+def test_window_behind_a_post_is_found_and_a_known_one_is_let_be() -> None:
+    porch = Box("porch", "porch", 5, -1, 4, 2, 2.5, Roof("flat"))
+    behind = replace(WINDOW, u=2.8)
+    found = problems(house(porch, front=(replace(DOOR, u=4.5), behind)))
+    assert ["post" in p.message for p in found] == [True]
+    kept = house(porch, front=(replace(DOOR, u=4.5), replace(behind, known=True)))
+    assert problems(kept) == []
+
+
+def test_garage_wants_its_door() -> None:
+    garage = Box("garage", "garage", 13, 4, 6, 6, 2.7, Roof("flat"))
+    assert [p.pointer for p in problems(house(garage))] == ["/boxes/1"]
+
+
+def test_partial_building_is_held_to_what_it_says() -> None:
+    whole = house()
+    partial = replace(whole, partial=True, facades={"front": whole.facades["front"]})
+    assert problems(partial) == []
+    bad = with_front(partial, lambda p: replace(p, width=9.0))
+    assert problems(bad) == []
+    assert problems(replace(bad, complete=("mass",)))
+
+
+def test_roof_height_over_the_middle_and_the_eaves() -> None:
+    import numpy as np
+
+    box = Box("b", "general", 0, 0, 10, 8, 3, Roof("gable", 45, "x", 0.5))
+    at = np.array([[0.0, 0.0], [0.0, 4.0], [0.0, -4.5], [0.0, 5.0]])
+    heights = roof_height(box, at)
+    assert heights[:3] == pytest.approx([7.0, 3.0, 2.5])
+    assert np.isnan(heights[3])
+
+
+def test_porch_posts_leave_the_middle_free_and_touch_no_wall() -> None:
+    porch = Box("porch", "porch", 5, -1, 8, 2, 2.5, Roof("flat"))
+    posts = porch_posts(house(porch), porch)
+    assert len(posts) == 4
+    assert posts[:, 1] == pytest.approx(-1.9)
+    assert abs(posts[:, 0] - 5).min() > 1
+
+
+def test_upper_wall_is_not_blocked_by_the_porch_below() -> None:
+    porch = Box("porch", "porch", 5, -1, 8, 2, 2.5, Roof("flat"))
+    building = house(porch)
+    upper = building.facades["front"].pieces[-1]
+    assert upper.origin[2] == 3
+    assert len(blocked_rectangles(building, "front", upper)) == 0

@@ -135,6 +135,7 @@ def porch_posts(building: Building, porch: Box) -> Points2:
 
 def _spread(low: float, high: float) -> list[float]:
     count = max(int(np.ceil((high - low) / POST_SPACING - NEAR)), 1)
+    count += 1 - count % 2
     return [float(value) for value in np.linspace(low, max(high, low), count + 1)]
 
 

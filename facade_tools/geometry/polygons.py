@@ -1,0 +1,44 @@
+"""Polygons in plan: rings of points, orientation, conversion to and from shapely."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import shapely
+
+from .arrays import Points2
+
+Rings = list[Points2]  # an outer ring counter-clockwise, then holes clockwise, none closed
+
+
+def signed_area(ring: Points2) -> float:
+    """Return the area of a ring (n, 2), positive when counter-clockwise.
+
+    >>> signed_area(np.array([[0, 0], [2, 0], [2, 1], [0, 1]], dtype=float))
+    2.0
+    """
+    if len(ring) < 3:
+        return 0.0
+    x, y = (ring - ring[0]).T
+    return 0.5 * float(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
+
+
+def oriented(rings: Iterable[Sequence[Sequence[float]] | Points2]) -> Rings:
+    """Return the rings as arrays: the outer one counter-clockwise, the others clockwise."""
+    arrays = [np.asarray(ring, dtype=np.float64)[:, :2] for ring in rings]
+    return [
+        ring if (signed_area(ring) > 0) == (place == 0) else ring[::-1]
+        for place, ring in enumerate(arrays)
+    ]
+
+
+def rings_of(polygon: shapely.Polygon) -> Rings:
+    """Return the oriented rings of a shapely polygon."""
+    loops = [polygon.exterior, *polygon.interiors]
+    return oriented(shapely.get_coordinates(loop)[:-1] for loop in loops)
+
+
+def shape_of(rings: Sequence[Points2]) -> shapely.Polygon:
+    """Return the shapely polygon of an outer ring and holes."""
+    return shapely.Polygon(rings[0], list(rings[1:]))

@@ -1,0 +1,54 @@
+"""Triangles of planar polygons with holes, in plan or in space."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mapbox_earcut
+import numpy as np
+
+from .arrays import Floats, Integers, Points2, Points3, Triangles
+
+
+def newell_normal(points: Points3) -> Floats:
+    """Return twice the area vector (3,) of the closed ring `points` (n, 3)."""
+    following = np.roll(points, -1, axis=0)
+    return np.asarray(np.cross(points, following).sum(axis=0), dtype=np.float64)
+
+
+def flattened(points: Points3, normal: Floats) -> Points2:
+    """Drop the coordinate that `normal` is largest in; orientation about the normal is kept."""
+    axis = int(np.argmax(np.abs(normal)))
+    u, v = [(1, 2), (2, 0), (0, 1)][axis]
+    flat = points[:, [u, v]]
+    return flat if normal[axis] >= 0 else flat[:, ::-1]
+
+
+def triangulate_rings(rings: Sequence[Points2]) -> Triangles:
+    """Return triangles (m, 3), counter-clockwise, over the concatenated points of the rings.
+
+    rings: an outer ring, then holes, none closed. No point is added and every edge of a ring
+    is an edge of exactly one triangle.
+    """
+    points = np.ascontiguousarray(np.concatenate(rings), dtype=np.float64)
+    ends = np.cumsum([len(ring) for ring in rings]).astype(np.uint32)
+    origin = points.min(axis=0)
+    found = mapbox_earcut.triangulate_float64(points - origin, ends)
+    triangles = np.asarray(found, dtype=np.int64).reshape(-1, 3)
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    turn = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+    triangles[turn < 0] = triangles[turn < 0][:, ::-1]
+    return triangles
+
+
+def triangulate_face(vertices: Points3, rings: Sequence[Integers]) -> Triangles:
+    """Return triangles of a planar face in space, as indices of `vertices`.
+
+    rings: indices of the outer ring (counter-clockwise from outside), then of the holes.
+    """
+    if len(rings) == 1 and len(rings[0]) == 3:
+        return np.asarray(rings[0], dtype=np.int64).reshape(1, 3)
+    index = np.concatenate([np.asarray(ring, dtype=np.int64) for ring in rings])
+    normal = newell_normal(vertices[np.asarray(rings[0], dtype=np.int64)])
+    local = triangulate_rings([flattened(vertices[list(ring)], normal) for ring in rings])
+    return index[local]

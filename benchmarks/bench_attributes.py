@@ -46,9 +46,8 @@ def main() -> None:
     houses = list(read(paths, "building"))
     library = rate(building_attributes, houses)
     print(f"buildings                    {len(houses)}")
-    print(
-        f"building_attributes          {library:8.0f}/s   {library / GOAL:5.2f} × the goal of {GOAL}/s"
-    )
+    ratio = f"{library / GOAL:5.2f} × the goal of {GOAL}/s"
+    print(f"building_attributes          {library:8.0f}/s   {ratio}")
     print(f"facade_pieces                {rate(facade_pieces, houses):8.0f}/s")
     print(f"facade attributes (process)  {command_rate(paths):8.0f}/s")
 

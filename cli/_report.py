@@ -6,7 +6,8 @@ import logging
 import os
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import click
 
@@ -27,9 +28,43 @@ def start_logging(verbose: int, quiet: bool) -> None:
     logger.propagate = False
 
 
+Message = tuple[int, str]  # level and text
+
+
 class _Handler(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
-        click.echo(f"facade: {record.levelname.lower()}: {record.getMessage()}", err=True)
+        show_messages([(record.levelno, record.getMessage())])
+
+
+class _Collector(logging.Handler):
+    def __init__(self) -> None:
+        super().__init__()
+        self.messages: list[Message] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.messages.append((record.levelno, record.getMessage()))
+
+
+@contextmanager
+def collected_log() -> Iterator[list[Message]]:
+    """Keep what the library logs, so that workers' messages come out in the items' order."""
+    logger = logging.getLogger(LOGGER)
+    collector, handlers, level = _Collector(), logger.handlers, logger.level
+    logger.handlers, logger.propagate = [collector], False
+    logger.setLevel(logging.DEBUG)  # the process that shows them decides
+    try:
+        yield collector.messages
+    finally:
+        logger.handlers = handlers
+        logger.setLevel(level)
+
+
+def show_messages(messages: Sequence[Message]) -> None:
+    """Write messages to standard error, those that the level of the log lets through."""
+    threshold = logging.getLogger(LOGGER).getEffectiveLevel()
+    for level, text in messages:
+        if level >= threshold:
+            click.echo(f"facade: {logging.getLevelName(level).lower()}: {text}", err=True)
 
 
 def explain(error: BaseException, arguments: Sequence[str]) -> int:
@@ -37,6 +72,7 @@ def explain(error: BaseException, arguments: Sequence[str]) -> int:
     if isinstance(error, click.exceptions.Exit):
         return error.exit_code
     if isinstance(error, click.Abort | KeyboardInterrupt):
+        click.echo("facade: interrupted", err=True)
         return 130
     if isinstance(error, BrokenPipeError):  # the reader of a pipe has had enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

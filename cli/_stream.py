@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -21,7 +21,15 @@ from facade_tools.parallel import map_ordered
 from facade_tools.randomness import item_generator
 
 from ._options import StreamOptions
-from ._report import Progress, say_error
+from ._report import Message, Progress, collected_log, say_error, show_messages
+
+
+@dataclass(frozen=True, slots=True)
+class ItemResult:
+    """Id and bytes of every artifact that an item became, and the log of its making."""
+
+    artifacts: tuple[tuple[str, bytes], ...]
+    messages: list[Message]
 
 
 @dataclass(frozen=True)
@@ -42,25 +50,27 @@ class ItemStage:
     seed: int | None = None
     indented: bool = False
 
-    def __call__(self, item: RawItem) -> list[tuple[str, bytes]]:
-        """Return id and bytes of every artifact made from `item`."""
+    def __call__(self, item: RawItem) -> ItemResult:
+        """Return id and bytes of every artifact made from `item`, and what was logged."""
+        with collected_log() as messages:
+            return ItemResult(tuple(self._artifacts(item)), messages)
+
+    def _artifacts(self, item: RawItem) -> Iterator[tuple[str, bytes]]:
         artifact = item.artifact(*self.reads)
         rng = (
             {} if self.seed is None else {"rng": item_generator(self.seed, self.name, artifact.id)}
         )
+        inputs = (item.provenance(), *self.sources)
+        provenance = Provenance(self.name, self.seed, self.recorded, inputs)
+        dump = dump_document if self.indented else dump_line
         try:
             results = self.function(artifact, **self.options, **rng)
+            for result in results if isinstance(results, Iterable) else [results]:
+                yield result.id, dump(encode(replace(result, provenance=provenance)))
         except InvalidInput as error:
             raise error.at(item.source, item.line) from None
         except FacadeError as error:
             raise type(error)(f"{_place(item)}: {artifact.id}: {error}") from None
-        inputs = (item.provenance(), *self.sources)
-        provenance = Provenance(self.name, self.seed, self.recorded, inputs)
-        dump = dump_document if self.indented else dump_line
-        return [
-            (result.id, dump(encode(replace(result, provenance=provenance))))
-            for result in (results if isinstance(results, Iterable) else [results])
-        ]
 
 
 def _place(item: RawItem) -> str:
@@ -80,11 +90,14 @@ def run_stream(stage: ItemStage, stream: StreamOptions) -> None:
     )
     progress = Progress(stage.name)
     bad = 0
-    with open_sink(stream.output) as write:
+    with open_sink(stream.output) as write, closing(outcomes):
         for outcome in outcomes:
-            if outcome.error is None:
-                for identity, data in outcome.value or []:
+            if outcome.value is not None:
+                show_messages(outcome.value.messages)
+                for identity, data in outcome.value.artifacts:
                     write(identity, data)
+            elif outcome.error is None:
+                continue
             elif stream.on_error == "stop" or not isinstance(outcome.error, FacadeError):
                 _show_remote(outcome.traceback)
                 raise outcome.error

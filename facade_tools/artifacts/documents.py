@@ -19,6 +19,7 @@ KINDS: dict[str, str] = {
     "blocks": "blocks:Blocks",
     "building": "building:Building",
     "footprint": "footprint:Footprint",
+    "model": "model:Model",
 }
 
 MAX_YAML_BYTES = 4 << 20
@@ -81,11 +82,12 @@ def _yaml_loader() -> Any:
             return super().compose_node(parent, index)
 
         def construct_mapping(self, node: Any, deep: bool = False) -> Any:
-            keys = [key.value for key, _ in node.value]
-            for (key, _), name in zip(node.value, keys, strict=True):
-                if keys.count(name) > 1:
-                    problem = f"key {name!r} stands twice"
+            seen: set[str] = set()
+            for key, _ in node.value:
+                if str(key.value) in seen:
+                    problem = f"key {key.value!r} stands twice"
                     raise yaml.MarkedYAMLError(None, None, problem, key.start_mark)
+                seen.add(str(key.value))
             return super().construct_mapping(node, deep)
 
     return Loader

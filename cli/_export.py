@@ -1,0 +1,128 @@
+"""The body of `facade export`."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import click
+
+from facade_tools.artifacts.store import RawItem
+from facade_tools.artifacts.writing import write_bytes
+from facade_tools.errors import FacadeError, InvalidInput, OutputFailed
+from facade_tools.formats.models import ENDINGS, model_files, placed
+
+from ._items import each, load
+from ._options import StreamOptions
+from ._stream import file_name, is_folder
+
+# Kind of artifact -> function that makes a Scene of it; what a GLB or OBJ shows.
+SCENES = {
+    "building": "facade_tools.geometry.details:building_scene",
+    "footprint": "facade_tools.geometry.details:footprint_scene",
+}
+# Kind of artifact -> function that makes a CityModel of it.
+CITY = {
+    "building": "facade_tools.formats.city:building_model",
+    "footprint": "facade_tools.formats.city:footprint_model",
+}
+
+
+@dataclass(frozen=True)
+class Part:
+    """Makes what an item becomes in a model of the format: a Scene, or a CityModel."""
+
+    form: str
+
+    def __call__(self, item: RawItem) -> Any:
+        """Read the item and convert it; raises InvalidInput with its place."""
+        table = CITY if self.form == "cityjson" else SCENES
+        artifact = item.artifact(*table)
+        try:
+            return load(table[artifact.kind])(artifact)
+        except InvalidInput as error:
+            raise error.at(item.source, item.line) from None
+        except FacadeError as error:
+            raise type(error)(f"{artifact.id}: {error}") from None
+
+
+@dataclass(frozen=True)
+class Files:
+    """Makes all files of an item's own model."""
+
+    form: str
+
+    def __call__(self, item: RawItem) -> tuple[str, dict[str, bytes]]:
+        """Return the item's id and the bytes of its files by name."""
+        part = Part(self.form)(item)
+        return part.name, model_files([part], file_name(part.name), self.form)
+
+
+def run_export(stream: StreamOptions, form: str | None, arrange: str) -> None:
+    """Write all items to the output that the options name."""
+    output = stream.output
+    if output is None:
+        raise click.UsageError("Missing option '-o': name a file or a folder.")
+    if output == "-":
+        _to_stdout(stream, form or "glb", arrange)
+    elif _ending(output) is None and is_folder(output):
+        _to_folder(stream, Path(output), form or "glb")
+    else:
+        _to_file(stream, Path(output), form or _ending(output), arrange)
+
+
+def _ending(output: str) -> str | None:
+    if output.endswith("/") or Path(output).is_dir():
+        return None
+    return next((form for form, end in ENDINGS.items() if output.lower().endswith(end)), None)
+
+
+def _to_folder(stream: StreamOptions, folder: Path, form: str) -> None:
+    seen: set[str] = set()
+    for identity, files in each("export", Files(form), stream):
+        if file_name(identity) in seen:
+            raise InvalidInput(f"id {identity!r} stands twice; expected unique ids in a folder")
+        seen.add(file_name(identity))
+        _write(folder, files)
+
+
+def _to_file(stream: StreamOptions, path: Path, form: str | None, arrange: str) -> None:
+    if form is None:
+        known = ", ".join(ENDINGS.values())
+        raise click.UsageError(f"{path}: unknown ending; expected {known}, a folder, or --format")
+    end = ENDINGS[form]
+    stem = path.name[: -len(end)] if path.name.lower().endswith(end) else path.stem
+    files = model_files(_parts(stream, form, arrange), file_name(stem), form)
+    renamed = {_as_named(name, file_name(stem) + end, path): data for name, data in files.items()}
+    _write(path.parent, renamed)
+
+
+def _as_named(name: str, main: str, path: Path) -> str:
+    return path.name if name == main else name
+
+
+def _to_stdout(stream: StreamOptions, form: str, arrange: str) -> None:
+    if form == "obj":
+        raise click.UsageError("OBJ is several files; name a file or a folder with -o.")
+    (data,) = model_files(_parts(stream, form, arrange), "stdin", form).values()
+    sys.stdout.buffer.write(data)
+
+
+def _parts(stream: StreamOptions, form: str, arrange: str) -> list[Any]:
+    parts = list(each("export", Part(form), stream))
+    names = [part.name for part in parts]
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise InvalidInput(f"id {twice!r} stands twice; expected unique ids in one file")
+    return placed(parts, arrange)
+
+
+def _write(folder: Path, files: dict[str, bytes]) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputFailed(f"{folder}: cannot be made: {error.strerror}") from error
+    for name, data in files.items():
+        write_bytes(folder / name, data)

@@ -1,0 +1,50 @@
+"""Items of a stream mapped for stages that end in files of their own: export, view."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from importlib import import_module
+from typing import Any, TypeVar
+
+from facade_tools.artifacts.store import RawItem, read_raw
+from facade_tools.errors import FacadeError, InvalidInput
+from facade_tools.parallel import map_ordered
+
+from ._options import StreamOptions
+from ._report import Progress, say_error
+
+R = TypeVar("R")
+
+
+def load(target: str) -> Callable[..., Any]:
+    """Return the function that `module:name` names, importing it now."""
+    module, name = target.split(":")
+    function: Callable[..., Any] = getattr(import_module(module), name)
+    return function
+
+
+def each(name: str, function: Callable[[RawItem], R], stream: StreamOptions) -> Iterator[R]:
+    """Yield `function` of every item, in order, with progress and --on-error as asked for.
+
+    The last thing that it does after skipped items is to raise InvalidInput.
+    """
+    items = read_raw(stream.inputs)
+    outcomes = map_ordered(function, items, jobs=stream.jobs, scheduler=stream.scheduler)
+    progress = Progress(name)
+    bad = 0
+    with closing(outcomes):
+        for outcome in outcomes:
+            if outcome.value is not None:
+                yield outcome.value
+            elif outcome.error is None:
+                continue
+            elif stream.on_error == "stop" or not isinstance(outcome.error, FacadeError):
+                raise outcome.error
+            else:
+                say_error(name, outcome.error)
+                bad += 1
+            progress.advance()
+        progress.close()
+    if bad:
+        raise InvalidInput(f"{bad} bad items were skipped")

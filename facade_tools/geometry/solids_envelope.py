@@ -18,6 +18,7 @@ from .arrays import Floats, Integers, Points2
 from .polygons import rings_of, shape_of
 from .roofs import Patch
 from .solids_merge import Piece, merged
+from .solids_pinch import unpinched
 from .solids_surface import Label, Solid
 
 Shapes = NDArray[np.object_]  # shapely geometries
@@ -41,7 +42,7 @@ def envelope_solid(patches: list[Patch]) -> Solid:
     plan = _cells(patches)
     pillars = _pillars(plan, patches)
     pieces = _caps(plan, patches, pillars) + _walls(plan, patches, pillars)
-    return merged(np.array(pillars.vertices, dtype=np.float64), pieces)
+    return unpinched(merged(np.array(pillars.vertices, dtype=np.float64), pieces))
 
 
 # --- the plan -------------------------------------------------------------------------------------
@@ -57,7 +58,11 @@ def _cells(patches: list[Patch]) -> _Plan:
 
 
 def _meeting_lines(shapes: Shapes, planes: Floats) -> Shapes:
-    """Return where the planes of two overlapping patches are equally high, within both."""
+    """Return where the planes of two overlapping patches are equally high, within both.
+
+    Patches that only touch cross in a point of their common border; the line within the first
+    of them puts a node there.
+    """
     tree = shapely.STRtree(shapes)
     first, second = tree.query(shapes)
     first, second = first[first < second], second[first < second]
@@ -74,9 +79,11 @@ def _meeting_lines(shapes: Shapes, planes: Floats) -> Shapes:
     middle = shapely.get_coordinates(shapely.centroid(shapes[first]))
     foot = foot + along * np.sum((middle - foot) * along, axis=1)[:, None]
     ends = np.stack([foot - reach * along, foot + reach * along], axis=1)
-    inside = shapely.intersection(shapely.linestrings(ends), shapes[first])
-    inside = shapely.intersection(inside, shapes[second])
-    parts = shapely.get_parts(inside)
+    lines = shapely.linestrings(ends)
+    inside = shapely.intersection(lines, shapes[first])
+    common = shapely.intersection(inside, shapes[second])
+    touching = (shapely.get_dimensions(common) < 1) & shapely.intersects(lines, shapes[second])
+    parts = shapely.get_parts(np.where(touching, inside, common))
     return np.asarray(parts[shapely.get_dimensions(parts) == 1], dtype=object)
 
 

@@ -28,17 +28,55 @@ def triangulate_rings(rings: Sequence[Points2]) -> Triangles:
     """Return triangles (m, 3), counter-clockwise, over the concatenated points of the rings.
 
     rings: an outer ring, then holes, none closed. No point is added and every edge of a ring
-    is an edge of exactly one triangle.
+    is an edge of exactly one triangle, also where points lie in one line (earcut alone drops
+    such points).
     """
     points = np.ascontiguousarray(np.concatenate(rings), dtype=np.float64)
     ends = np.cumsum([len(ring) for ring in rings]).astype(np.uint32)
-    origin = points.min(axis=0)
-    found = mapbox_earcut.triangulate_float64(points - origin, ends)
-    triangles = np.asarray(found, dtype=np.int64).reshape(-1, 3)
+    points = points - points.min(axis=0)
+    found = np.asarray(mapbox_earcut.triangulate_float64(points, ends), dtype=np.int64)
+    triangles = found.reshape(-1, 3)
+    if len(triangles) != len(points) + 2 * len(rings) - 4:
+        triangles = _conforming(points, triangles)
     a, b, c = (points[triangles[:, k]] for k in range(3))
-    turn = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    triangles[turn < 0] = triangles[turn < 0][:, ::-1]
+    turned = _cross(b - a, c - a) < 0
+    triangles[turned] = triangles[turned][:, ::-1]
     return triangles
+
+
+def _cross(a: Points2, b: Points2) -> Floats:
+    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+
+
+def _conforming(points: Points2, triangles: Triangles) -> Triangles:
+    """Split triangles at the points that lie on their edges."""
+    pending = [tuple(row) for row in triangles.tolist()]
+    done = []
+    while pending:
+        triangle = pending.pop()
+        halves = _split(points, triangle)
+        if halves:
+            pending += halves
+        else:
+            done.append(triangle)
+    return np.array(done, dtype=np.int64).reshape(-1, 3)
+
+
+def _split(points: Points2, triangle: tuple[int, ...]) -> list[tuple[int, ...]]:
+    """Return the two halves of a triangle at the first point inside one of its edges."""
+    for k in range(3):
+        a, b, c = triangle[k], triangle[(k + 1) % 3], triangle[(k + 2) % 3]
+        edge = points[b] - points[a]
+        length = float(edge @ edge)
+        offset = points - points[a]
+        along = offset @ edge / length
+        aside = np.abs(offset[:, 0] * edge[1] - offset[:, 1] * edge[0])
+        inside = (along > 0) & (along < 1) & (aside <= 1e-9 * length)
+        inside[[a, b, c]] = False
+        if inside.any():
+            middle = int(np.flatnonzero(inside)[0])
+            return [(a, middle, c), (middle, b, c)]
+    return []
 
 
 def triangulate_face(vertices: Points3, rings: Sequence[Integers]) -> Triangles:

@@ -1,0 +1,125 @@
+"""Edges at which four faces meet are opened, so that every reader sees a manifold.
+
+Two parts of a building that touch in a vertical line only (corner to corner) share an edge of
+four faces. There the vertices are doubled and each copy is drawn a tenth of a millimetre into
+its own part.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+
+import numpy as np
+
+from .arrays import Floats, Points3
+from .solids_surface import Face, Solid
+from .triangulate import newell_normal
+
+NUDGE = 1e-4  # metres
+Edge = tuple[int, int]
+Corner = tuple[int, int, int]  # face, ring, place in the ring
+
+
+def unpinched(solid: Solid) -> Solid:
+    """Return the solid with every edge shared by exactly two faces."""
+    edges = _half_edges(solid.faces)
+    pinched = {edge for edge, corners in edges.items() if len(corners) > 1}
+    if not pinched:
+        return solid
+    normals = [_unit(newell_normal(solid.vertices[list(face[0])])) for face in solid.faces]
+    parent: dict[Corner, Corner] = {}
+    for edge, corners in edges.items():
+        for corner in corners:
+            partner = _partner(solid.vertices, normals, edge, corner, edges[edge[::-1]])
+            _unite(parent, corner, _following(solid.faces, partner))
+            _unite(parent, _following(solid.faces, corner), partner)
+    return _opened(solid, normals, parent, {k for edge in pinched for k in edge})
+
+
+def _half_edges(faces: tuple[Face, ...]) -> dict[Edge, list[Corner]]:
+    """Return, per directed edge, the corners at which it starts."""
+    edges: dict[Edge, list[Corner]] = defaultdict(list)
+    for f, face in enumerate(faces):
+        for r, ring in enumerate(face):
+            for k, vertex in enumerate(ring):
+                edges[vertex, ring[(k + 1) % len(ring)]].append((f, r, k))
+    return dict(edges)
+
+
+def _following(faces: tuple[Face, ...], corner: Corner) -> Corner:
+    f, r, k = corner
+    return f, r, (k + 1) % len(faces[f][r])
+
+
+def _partner(
+    vertices: Points3, normals: list[Floats], edge: Edge, corner: Corner, opposite: list[Corner]
+) -> Corner:
+    """Return the face across the edge that bounds the same wedge of the solid."""
+    if len(opposite) == 1:
+        return opposite[0]
+    along = _unit(vertices[edge[1]] - vertices[edge[0]])
+    normal = normals[corner[0]]
+    ahead = np.cross(normal, along)
+    angles = []
+    for other in opposite:
+        towards = np.cross(normals[other[0]], -along)
+        turn = np.arctan2(-float(towards @ normal), float(towards @ ahead))
+        angles.append(turn % (2 * np.pi))
+    return opposite[int(np.argmin(angles))]
+
+
+def _opened(
+    solid: Solid, normals: list[Floats], parent: dict[Corner, Corner], open_at: set[int]
+) -> Solid:
+    """Give each fan of faces around a pinched vertex a vertex of its own."""
+    fans: dict[tuple[int, Corner], set[int]] = defaultdict(set)
+    for f, face in enumerate(solid.faces):
+        for r, ring in enumerate(face):
+            for k, vertex in enumerate(ring):
+                if vertex in open_at:
+                    fans[vertex, _root(parent, (f, r, k))].add(f)
+    copies = Counter(vertex for vertex, _ in fans)
+    vertices = [tuple(row) for row in solid.vertices.tolist()]
+    renamed: dict[tuple[int, Corner], int] = {}
+    for (vertex, fan), faces in fans.items():
+        if copies[vertex] > 1:
+            inwards = -sum(normals[f] for f in faces if solid.labels[f].semantic == "wall")
+            renamed[vertex, fan] = len(vertices)
+            vertices.append(tuple((solid.vertices[vertex] + NUDGE * _unit(inwards)).tolist()))
+    faces_ = tuple(
+        tuple(
+            tuple(
+                renamed.get((vertex, _root(parent, (f, r, k))), vertex)
+                for k, vertex in enumerate(ring)
+            )
+            for r, ring in enumerate(face)
+        )
+        for f, face in enumerate(solid.faces)
+    )
+    return Solid(*_used(vertices, faces_), solid.labels)
+
+
+def _used(
+    vertices: list[tuple[float, ...]], faces: tuple[Face, ...]
+) -> tuple[Points3, tuple[Face, ...]]:
+    used = sorted({k for face in faces for ring in face for k in ring})
+    place = {k: new for new, k in enumerate(used)}
+    kept = np.array([vertices[k] for k in used], dtype=np.float64)
+    return kept, tuple(tuple(tuple(place[k] for k in ring) for ring in face) for face in faces)
+
+
+def _unit(vector: Floats) -> Floats:
+    length = float(np.linalg.norm(vector))
+    return vector / length if length > 0 else vector
+
+
+def _root(parent: dict[Corner, Corner], corner: Corner) -> Corner:
+    while parent.get(corner, corner) != corner:
+        corner = parent[corner]
+    return corner
+
+
+def _unite(parent: dict[Corner, Corner], a: Corner, b: Corner) -> None:
+    root_a, root_b = _root(parent, a), _root(parent, b)
+    if root_a != root_b:
+        parent[max(root_a, root_b)] = min(root_a, root_b)

@@ -59,8 +59,11 @@ def _object_encoder(cls: Any) -> Convert:
         if field.default_factory is not dataclasses.MISSING
     }
 
+    name_of_kind = getattr(cls, "kind", None)  # an artifact, also inside another one
+    head = {"schema": f"facade-tools/{name_of_kind}/1"} if isinstance(name_of_kind, str) else {}
+
     def encode(value: Any) -> dict[str, Any]:
-        out: dict[str, Any] = {}
+        out: dict[str, Any] = dict(head)
         for name, default, keep in rows:
             item = getattr(value, name)
             if keep or (item is not default and item != empty.get(name, default)):

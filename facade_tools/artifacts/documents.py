@@ -19,6 +19,7 @@ KINDS: dict[str, str] = {
     "blocks": "blocks:Blocks",
     "building": "building:Building",
     "footprint": "footprint:Footprint",
+    "library": "library:Library",
     "model": "model:Model",
 }
 

@@ -11,7 +11,8 @@ from .arrays import Points2, Points3, Triangles
 class Material:
     """Surface of a mesh: sRGB colour #rrggbb, opacity, roughness and metalness in 0..1.
 
-    texture: an encoded PNG or JPEG picture (its bytes), multiplied with the colour.
+    texture: an encoded PNG or JPEG picture (its bytes), multiplied with the colour. pattern:
+    `siding`, `shingle`, `brick`, `grass` or nothing: a relief that previews draw on the colour.
     """
 
     name: str
@@ -20,11 +21,14 @@ class Material:
     roughness: float = 0.9
     metallic: float = 0.0
     texture: bytes | None = None
+    pattern: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class Mesh:
     """A named part; faces (m, 3) run counter-clockwise seen from outside, z is up.
+
+    Neighbours in a scene that share a name are one part in several materials.
 
     uv: (n, 2) texture coordinates, origin at the picture's lower left, or None.
     """

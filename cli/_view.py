@@ -1,0 +1,136 @@
+"""The body of `facade view`."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from facade_tools.artifacts.store import RawItem
+from facade_tools.artifacts.writing import write_bytes
+from facade_tools.errors import FacadeError, InvalidInput
+from facade_tools.formats.gltf import write as write_glb
+from facade_tools.formats.meshes import MESH_ENDINGS, read_scene
+from facade_tools.formats.png import write as write_png
+from facade_tools.geometry.mesh import Scene
+from facade_tools.imaging.camera import View
+from facade_tools.imaging.contact_sheet import SIDE_VIEWS, contact_sheet
+from facade_tools.imaging.page import Exhibit, page
+from facade_tools.imaging.render import Picture, render
+
+from ._items import each, load
+from ._options import StreamOptions
+from .view import DRAWINGS
+
+MOST_PICTURES = 2000
+
+
+@dataclass(frozen=True)
+class ViewOptions:
+    """What the command line asks for."""
+
+    azimuth: float
+    elevation: float
+    size: tuple[int, int] | None
+    columns: int | None
+    sides: bool
+    no_labels: bool
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """Makes what an item looks like: its name and a Scene or picture; pictures where asked for."""
+
+    views: tuple[View, ...] = ()
+
+    def __call__(self, item: RawItem) -> tuple[str, Any]:
+        """Return the item's id and its drawing, or its pictures from all views."""
+        if Path(item.source).suffix.lower() in MESH_ENDINGS:
+            name, drawn = Path(item.source).stem, read_scene(Path(item.source))
+            return name, self.seen(drawn)
+        artifact = item.artifact(*DRAWINGS)
+        try:
+            return artifact.id, self.seen(load(DRAWINGS[artifact.kind])(artifact))
+        except InvalidInput as error:
+            raise error.at(item.source, item.line) from None
+        except FacadeError as error:
+            raise type(error)(f"{artifact.id}: {error}") from None
+
+    def seen(self, drawing: Any) -> Any:
+        """Return pictures of a drawing from the views; without views the drawing itself."""
+        if not self.views:
+            return drawing
+        if not isinstance(drawing, Scene):
+            return [drawing]
+        return [render(drawing, view) for view in self.views]
+
+
+def run_view(stream: StreamOptions, options: ViewOptions) -> None:
+    """Draw all inputs to the output."""
+    output = stream.output
+    if output is None:
+        raise click.UsageError("Missing option '-o': name a .png or .html file.")
+    ending = Path(output).suffix.lower()
+    if ending in (".html", ".htm"):
+        _emit(output, _page(stream, Path(output).stem))
+    elif ending == ".png" or output == "-":
+        _emit(output, write_png(_sheet(stream, options)))
+    else:
+        raise click.UsageError(f"{output}: unknown ending; expected .png or .html.")
+
+
+def _emit(output: str, data: bytes) -> None:
+    if output == "-":
+        sys.stdout.buffer.write(data)
+    else:
+        write_bytes(Path(output), data)
+
+
+def _sheet(stream: StreamOptions, options: ViewOptions) -> Picture:
+    pictures: list[Picture] = []
+    labels: list[str] = []
+    for name, seen in _rendered(stream, options):
+        pictures += seen
+        labels += [name] * len(seen) if len(seen) == 1 else _side_labels(name, len(seen))
+        if len(pictures) > MOST_PICTURES:
+            raise InvalidInput(f"more than {MOST_PICTURES} pictures; draw fewer items at a time")
+    if len(pictures) == 1:
+        return pictures[0]
+    columns = options.columns or (4 if options.sides else None)
+    return contact_sheet(pictures, [] if options.no_labels else labels, columns)
+
+
+def _side_labels(name: str, count: int) -> list[str]:
+    return [f"{name} {side}" for side in list(SIDE_VIEWS)[:count]]
+
+
+def _rendered(stream: StreamOptions, options: ViewOptions) -> Any:
+    """Yield id and pictures of each item; a single item gets the larger picture."""
+    several = (400, 300)
+    if options.size is None and not options.sides:
+        first_two: list[tuple[str, Any]] = []
+        for drawn in each("view", Drawing(), stream):
+            first_two.append(drawn)
+        size = (960, 720) if len(first_two) == 1 else several
+        drawing = Drawing(_views(options, size))
+        return [(name, drawing.seen(shown)) for name, shown in first_two]
+    return each("view", Drawing(_views(options, options.size or several)), stream)
+
+
+def _views(options: ViewOptions, size: tuple[int, int]) -> tuple[View, ...]:
+    azimuths = list(SIDE_VIEWS.values()) if options.sides else [options.azimuth]
+    return tuple(View(azimuth, options.elevation, size) for azimuth in azimuths)
+
+
+def _page(stream: StreamOptions, title: str) -> bytes:
+    exhibits = []
+    for name, drawn in each("view", Drawing(), stream):
+        if isinstance(drawn, Scene):
+            exhibits.append(Exhibit(name, "model", write_glb([drawn], name)))
+        else:
+            exhibits.append(Exhibit(name, "picture", write_png(np.asarray(drawn))))
+    return page(exhibits, title)

@@ -1,0 +1,65 @@
+"""`facade view`: pictures and pages of any artifact."""
+
+from __future__ import annotations
+
+import re
+
+import click
+
+from ._options import StreamOptions, stream_options
+
+# Kind of artifact -> function(artifact) that returns a Scene or an RGB picture (h, w, 3) uint8.
+# One line a kind; the function's module loads when an artifact of the kind is drawn.
+DRAWINGS = {
+    "building": "facade_tools.geometry.details:building_scene",
+    "footprint": "facade_tools.geometry.details:footprint_scene",
+    "attributes": "facade_tools.imaging.attribute_glyphs:attribute_glyph",
+}
+
+
+class Size(click.ParamType):
+    """Width x height in pixels."""
+
+    name = "WxH"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, int]:
+        """Return (width, height)."""
+        if isinstance(value, tuple):
+            return value
+        match = re.fullmatch(r"(\d{2,4})x(\d{2,4})", str(value))
+        if match is None:
+            self.fail(f"{value!r} is not WxH in pixels, like 640x480", param, ctx)
+        return int(match[1]), int(match[2])
+
+
+@click.command()
+@stream_options("ARTIFACT...", seeded=False)
+@click.option(
+    "--azimuth", type=float, default=-32.0, show_default=True,
+    help="Where the viewer stands, degrees: 0 in front, 90 at the right side.",
+)  # fmt: skip
+@click.option(
+    "--elevation", type=click.FloatRange(-10, 89), default=12.0, show_default=True,
+    help="How high the viewer stands, degrees above the horizon.",
+)  # fmt: skip
+@click.option(
+    "--size", type=Size(),
+    help="Pixels of one picture.  [default: 960x720; 400x300 when there are several]",
+)  # fmt: skip
+@click.option("--columns", type=click.IntRange(1, 100), help="Pictures side by side in a sheet.")
+@click.option("--sides", is_flag=True, help="Four pictures of each: front, right, back, left.")
+@click.option("--no-labels", is_flag=True, help="Leave the ids out of a sheet.")
+def command(stream: StreamOptions, **values: object) -> None:
+    """Draw any artifact: a picture (.png) or a page that turns in a browser (.html).
+
+    Several artifacts make a contact sheet, or a page with a list to pick from. Pages need no
+    network.
+
+    \b
+    Example: facade view buildings.jsonl -o sheet.png --columns 6
+    """
+    from ._view import ViewOptions, run_view
+
+    run_view(stream, ViewOptions(**values))  # type: ignore[arg-type]

@@ -1,0 +1,134 @@
+"""From a building or a footprint to a scene: closed mass, roof slabs, openings, porches, chimneys."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ..artifacts.building import SIDES, Building, Colors, Piece, Side
+from ..artifacts.footprint import Footprint
+from .detail_boxes import Box6, LocalFrame, meshes_of, side_frame
+from .detail_doors import door_parts, garage_door_parts
+from .detail_roofs import roof_slabs
+from .detail_volumes import bay_window, chimney, porch
+from .detail_windows import CASING, window_parts
+from .mesh import Material, Mesh, Scene
+from .solids import Solid, building_solid, footprint_solid, triangulated
+
+PALETTE = (
+    Colors("#d9d3c3", "#f4f2ec", "#54575c", "#7a2e2a"),
+    Colors("#9fb0b5", "#f5f5f2", "#4a4744", "#2e4057"),
+    Colors("#c9b79c", "#fbf8f0", "#6b4a3a", "#36523f"),
+    Colors("#b5543f", "#f1ebdf", "#4d4f55", "#22313f"),
+    Colors("#e9e6df", "#ffffff", "#5d5f66", "#8c3b2e"),
+)
+PLINTH = 0.22  # height of the foundation that shows, metres
+
+
+def building_scene(building: Building) -> Scene:
+    """Return the scene of a building: `mass` is its closed solid, all else named parts.
+
+    A partial building is drawn as far as it is known. Raises InvalidInput where no mass can be
+    built.
+    """
+    solid = building_solid(building)
+    overhang = {box.id: box.roof.overhang for box in building.boxes if box.roof is not None}
+    meshes = [mass_mesh(solid), *roof_slabs(solid, overhang)]
+    for side in SIDES:
+        if side in building.facades:
+            for index, piece in enumerate(building.facades[side].pieces, 1):
+                meshes += _piece(f"{side}/piece-{index}", side, piece)
+    porches = [box for box in building.boxes if box.kind == "porch"]
+    for index, box in enumerate(porches, 1):
+        meshes += porch(f"porch-{index}", box, building)
+    for index, stack in enumerate(building.chimneys, 1):
+        meshes += chimney(f"chimney-{index}", stack, 0.0)
+    return Scene(building.id, tuple(meshes), materials(building.colors or PALETTE[0]))
+
+
+def footprint_scene(footprint: Footprint) -> Scene:
+    """Return the scene of a footprint: its extrusion with roof, and the roof's slab."""
+    solid = footprint_solid(footprint)
+    overhang = 0.0 if footprint.roof is None else footprint.roof.overhang
+    meshes = (mass_mesh(solid), *roof_slabs(solid, {"": overhang}))
+    return Scene(footprint.id, meshes, materials(PALETTE[4]))
+
+
+def mass_mesh(solid: Solid) -> Mesh:
+    """Return the closed solid as the mesh `mass`."""
+    vertices, triangles, _ = triangulated(solid)
+    return Mesh("mass", vertices, triangles, "wall")
+
+
+def materials(colors: Colors) -> dict[str, Material]:
+    """Return the materials of a building by name."""
+    rows = (
+        Material("wall", colors.wall, roughness=0.85, pattern="siding"),
+        Material("roof", colors.roof, roughness=0.95, pattern="shingle"),
+        Material("fascia", colors.trim, roughness=0.7),
+        Material("trim", colors.trim, roughness=0.6),
+        Material("door", colors.door, roughness=0.5),
+        Material("garage-door", _mixed(colors.trim, "#d8d8d4"), roughness=0.6),
+        Material("shadow", "#5c5a55", roughness=0.9),
+        Material("glass", "#2c3a45", roughness=0.08),
+        Material("metal", "#b9a06a", roughness=0.36, metallic=0.8),
+        Material("stone", "#a9a59c", roughness=0.9),
+        Material("plinth", "#8f8b83", roughness=0.95),
+        Material("brick", "#97503e", roughness=0.9, pattern="brick"),
+        Material("clay", "#b0694a", roughness=0.9),
+        Material("wood", "#9a8a74", roughness=0.85),
+    )
+    return {material.name: material for material in rows}
+
+
+def _mixed(first: str, second: str) -> str:
+    pairs = zip(bytes.fromhex(first[1:]), bytes.fromhex(second[1:]), strict=True)
+    return "#" + bytes((a + b) // 2 for a, b in pairs).hex()
+
+
+def _piece(name: str, side: Side, piece: Piece) -> Iterator[Mesh]:
+    frame = side_frame(side, piece.origin)
+    count: Counter[str] = Counter()
+    for element in piece.elements:
+        count[element.kind] += 1
+        part = f"{name}/{element.kind}-{count[element.kind]}"
+        if element.kind == "window" and element.style == "bay":
+            yield from bay_window(part, element, frame, 0.0)
+        elif element.kind == "window":
+            yield from meshes_of(part, window_parts(element), frame)
+        elif element.kind == "door":
+            yield from meshes_of(part, door_parts(element), frame)
+        else:
+            yield from meshes_of(part, garage_door_parts(element), frame)
+    yield from _plinth(f"{name}/plinth", piece, frame)
+
+
+def _plinth(name: str, piece: Piece, frame: LocalFrame) -> list[Mesh]:
+    """Return the foundation's band along a piece on the ground, open at doors."""
+    if piece.origin[2] > 1e-6:
+        return []
+    gaps = sorted(
+        (element.u - CASING, element.u + element.width + CASING)
+        for element in piece.elements
+        if element.v < PLINTH
+    )
+    boxes: list[Box6] = [
+        (a, 0.0, 0.0, b, PLINTH, 0.03) for a, b in _between(gaps, piece.width) if b - a > 1e-3
+    ]
+    return meshes_of(name, {"plinth": boxes}, frame)
+
+
+def _between(gaps: Sequence[tuple[float, float]], width: float) -> Iterator[tuple[float, float]]:
+    at = 0.0
+    for low, high in gaps:
+        yield at, min(low, width)
+        at = max(at, high)
+    yield at, width
+
+
+def signed_volume(mesh: Mesh) -> float:
+    """Return the volume (m³) that a closed mesh encloses, positive when it faces outward."""
+    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)

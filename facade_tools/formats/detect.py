@@ -38,7 +38,10 @@ class Format:
 
 
 # The first that recognises a file reads it.
-FORMATS = (Format("HOT2000", "hot2000"),)
+FORMATS = (
+    Format("HOT2000", "hot2000"),
+    Format("CityJSON", "cityjson_reader"),
+)
 
 
 def detect(head: bytes) -> Format:

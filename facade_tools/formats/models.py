@@ -1,48 +1,97 @@
-"""The table of model formats, and several models in one file."""
+"""The common second half of all city model formats: models to records to artifacts."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
-from typing import TypeVar
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
-from ..geometry.arrays import Floats
-from ..geometry.mesh import Scene
-from ..geometry.scenes import bounds, moved, shifts
-from . import cityjson, gltf, obj
-from .cityjson import CityModel
+import numpy as np
+import shapely
 
-ENDINGS = {"glb": ".glb", "obj": ".obj", "cityjson": ".city.json"}
+from ..artifacts.building import Frame
+from ..artifacts.footprint import Footprint
+from ..errors import InvalidInput
+from .model_building import Neighbour, building_of
+from .model_masses import footprint
+from .outbuildings import Outbuildings, adjoining, is_small, kind_of
+from .reading import Built, ReadOptions, Record
+from .surfaces import Model, bounds
 
-Part = TypeVar("Part", Scene, CityModel)
+Models = Callable[[], Iterator[Model | InvalidInput]]
 
 
-def model_files(parts: Sequence[Part], stem: str, form: str) -> dict[str, bytes]:
-    """Return the files of a model by name, the main one last.
+@dataclass(frozen=True)
+class House:
+    """A model with the outbuildings that belong to it."""
 
-    parts: Scenes, of the format `cityjson` CityModels. stem: the main file's name without ending.
+    model: Model
+    neighbours: tuple[Neighbour, ...] = ()
+
+
+def records(models: Models) -> Iterator[Record]:
+    """Yield a record for every building; outbuildings go to the house that they adjoin.
+
+    `models` reads the file from its start each time it is called: once to find the outbuildings,
+    which stay in memory, once to give them away.
     """
-    scenes = [part for part in parts if isinstance(part, Scene)]
-    cities = [part for part in parts if isinstance(part, CityModel)]
-    if form == "obj":
-        return obj.write(scenes, stem)
-    data = cityjson.write(cities, stem) if form == "cityjson" else gltf.write(scenes, stem)
-    return {f"{stem}{ENDINGS[form]}": data}
+    outbuildings, small = _outbuildings(models)
+    for model in models():
+        if isinstance(model, InvalidInput):
+            yield Record(model, pointer=model.place.pointer)
+        elif not kind_of(model.function) and model.id not in small:
+            yield Record(House(model, outbuildings.of(model)), pointer=f"/{model.id}")
+    for kind in outbuildings.left():
+        yield Record(Counter({f"{kind} that adjoins no house: left out": 1}))
 
 
-def placed(parts: Sequence[Part], arrange: str) -> list[Part]:
-    """Return the parts where they shall stand: `own`, `side-by-side`, or `auto` (see shifts)."""
-    if arrange == "own":
-        return list(parts)
-    steps = shifts([_bounds(part) for part in parts], always=arrange != "auto")
-    return [_moved(part, step) for part, step in zip(parts, steps, strict=True)]
+def _outbuildings(models: Models) -> tuple[Outbuildings, set[str]]:
+    coded: list[tuple[Model, str]] = []
+    small: list[Model] = []
+    large: list[tuple[float, ...]] = []
+    for model in models():
+        if isinstance(model, InvalidInput) or not model.surfaces:
+            continue
+        kind = kind_of(model.function)
+        if kind:
+            coded.append((model, kind))
+        elif is_small(model):
+            small.append(model)
+        else:
+            low, high = bounds(model.surfaces)
+            shift = np.array(model.origin)
+            large.append((*(low + shift)[:2].tolist(), *(high + shift)[:2].tolist()))
+    near = adjoining(small, large) if small and large else []
+    return Outbuildings([*coded, *((model, "garage") for model in near)]), {m.id for m in near}
 
 
-def _bounds(part: Scene | CityModel) -> Floats:
-    return bounds(part) if isinstance(part, Scene) else part.bounds()
+def build(record: Record, options: ReadOptions) -> Built:
+    """Return the artifacts of a record; raises InvalidInput where it makes none."""
+    payload = record.payload
+    if isinstance(payload, InvalidInput):
+        raise payload
+    if isinstance(payload, Counter):
+        return Built((), payload)
+    house: House = payload
+    if options.kind == "footprints":
+        return Built((footprint_of(house.model, options),))
+    building, notes = building_of(house.model, house.neighbours, options.front)
+    return Built((building,), notes)
 
 
-def _moved(part: Part, step: Floats) -> Part:
-    if isinstance(part, Scene):
-        return moved(part, step.tolist())
-    return replace(part, vertices=part.vertices + step)
+def footprint_of(model: Model, options: ReadOptions) -> Footprint:
+    """Return the plan of a model in its own frame, with eaves and roof of its largest box."""
+    building = building_of(model, (), options.front)[0]
+    largest = max(building.boxes, key=lambda box: box.width * box.depth)
+    frame = building.frame or Frame(0.0, model.origin)
+    turn = np.radians(-frame.rotation)
+    c, s = np.cos(turn), np.sin(turn)
+    offset = np.array(model.origin[:2]) - np.array(frame.shift[:2])
+    polygon = max(shapely.get_parts(footprint(model)), key=lambda part: part.area)
+    rings = [
+        tuple(tuple(row) for row in ((points + offset) @ np.array([[c, s], [-s, c]])).tolist())
+        for ring in shapely.get_rings(polygon)
+        if len(points := shapely.get_coordinates(ring)[:-1]) >= 3
+    ]
+    height = largest.height or 0.0
+    return Footprint(model.id, tuple(rings), height, largest.roof, frame, dict(building.tags))

@@ -1,0 +1,188 @@
+"""A city model's footprints and roofs to boxes with roofs."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from ..artifacts.building import Box, BoxKind, Chimney, Roof
+from ..geometry.rectilinear import areas, partition
+from .surfaces import Model, Surface, bounds, told
+from .surfaces_roofs import Plane, bodies, eaves_height, height_at, roof_of, roof_plane
+
+DETAIL_AREA = 6.0  # m²: a roof body smaller than this, above another one, is a dormer
+DETAIL_SHARE = 0.12  # of the footprint: likewise
+LEFT_OVER = 1.0  # m²: footprint without a roof above it that is worth a place
+SAME_EAVES = 0.2  # metres: eaves nearer than this are level
+LOWEST = 1.6  # metres: lower masses are terraces and ramps
+CHIMNEY_SIDE = 2.5  # metres: no chimney is wider
+
+
+@dataclass(frozen=True)
+class Mass:
+    """What stands under one roof: its plan, its eaves above the ground, its roof planes."""
+
+    plan: BaseGeometry
+    eaves: float
+    planes: tuple[Plane, ...]
+    code: str
+    kind: BoxKind = "general"
+
+
+@dataclass(frozen=True)
+class Boxes:
+    """Boxes of a building, the area error of their plan, and what was seen on the roof."""
+
+    boxes: tuple[Box, ...]
+    residual: float
+    dormers: int
+    chimneys: tuple[Chimney, ...]
+
+
+def footprint(model: Model) -> BaseGeometry:
+    """Return the plan of a model: of its ground surfaces, else of its roofs, else of its walls."""
+    surfaces = [surface for part in model.parts for surface in told(part)]
+    for meanings in (("ground",), ("roof",), ("wall", "closure")):
+        plans = [s.plan for s in surfaces if s.meaning in meanings and not s.plan.is_empty]
+        union = areas(shapely.union_all(plans, grid_size=1e-4)) if plans else shapely.Polygon()
+        if union.area > 1.0:
+            return union
+    return shapely.Polygon()
+
+
+def masses(model: Model, ground: float, notes: Counter[str]) -> tuple[list[Mass], list[Mass]]:
+    """Return what stands under each roof of a model, and the small roofs above others (dormers).
+
+    ground: height of the ground in the model's frame, metres. Parts of the footprint without a
+    roof go to the neighbour with which they share most of their outline.
+    """
+    found: list[Mass] = []
+    for index, part in enumerate(model.parts):
+        surfaces = told(part)
+        code = model.roof_types[index] if index < len(model.roof_types) else ""
+        plan = footprint(Model("", (part,), model.origin))
+        planes = [p for s in surfaces if s.meaning == "roof" and (p := roof_plane(s)) is not None]
+        for body in bodies(planes):
+            over = areas(shapely.union_all([p.plan for p in body]).intersection(plan))
+            if over.area > 0.05:
+                height = eaves_height(body, over) - ground
+                found.append(Mass(over, height, tuple(body), code))
+    found.sort(key=lambda mass: (-mass.plan.area, mass.eaves))
+    kept, details = _without_details(found)
+    return _levelled(_without_gaps(kept, footprint(model)), notes), details
+
+
+def _without_details(found: list[Mass]) -> tuple[list[Mass], list[Mass]]:
+    """Separate the roofs that stand above larger ones from those that stand beside them."""
+    kept: list[Mass] = []
+    details: list[Mass] = []
+    total = sum(mass.plan.area for mass in found)
+    for mass in found:
+        covered = shapely.union_all([other.plan for other in kept])
+        free = areas(mass.plan.difference(covered))
+        small = mass.plan.area < max(DETAIL_AREA, DETAIL_SHARE * total)
+        if free.area < (0.6 if small else 0.25) * mass.plan.area:
+            details.append(mass)
+        elif free.area > 0.2:
+            kept.append(Mass(free, mass.eaves, mass.planes, mass.code))
+    return kept, details
+
+
+def _without_gaps(found: list[Mass], whole: BaseGeometry) -> list[Mass]:
+    gaps = areas(whole.difference(shapely.union_all([mass.plan for mass in found]).buffer(1e-3)))
+    plans = [mass.plan for mass in found]
+    for gap in shapely.get_parts(gaps):
+        if gap.area > LEFT_OVER and plans:
+            rim = gap.buffer(0.05)
+            shared = [rim.intersection(mass.plan.boundary).length for mass in found]
+            best = int(np.argmax(shared))
+            plans[best] = areas(shapely.union_all([plans[best], gap.buffer(2e-3)]))
+    return [
+        Mass(plan, mass.eaves, mass.planes, mass.code, mass.kind)
+        for plan, mass in zip(plans, found, strict=True)
+    ]
+
+
+def _levelled(found: list[Mass], notes: Counter[str]) -> list[Mass]:
+    """Return masses whose nearly equal eaves are equal; too low ones are dropped."""
+    level: list[Mass] = []
+    for mass in found:
+        if mass.eaves < LOWEST:
+            notes["mass lower than 1.6 m: left out"] += 1
+            continue
+        same = [m.eaves for m in level if abs(m.eaves - mass.eaves) < SAME_EAVES]
+        eaves = same[0] if same else round(mass.eaves, 6)
+        level.append(Mass(mass.plan, eaves, mass.planes, mass.code, mass.kind))
+    return level
+
+
+def boxes_of(found: Sequence[Mass], notes: Counter[str]) -> tuple[tuple[Box, ...], float]:
+    """Return the boxes of masses, largest first, and the residual of their plan."""
+    parts = partition([mass.plan for mass in found])
+    boxes: list[Box] = []
+    counts: Counter[str] = Counter()
+    for mass, rectangles in zip(found, parts.rectangles, strict=True):
+        for x0, y0, x1, y1 in rectangles.tolist():
+            area = shapely.box(x0, y0, x1, y1)
+            counts[mass.kind] += 1
+            boxes.append(
+                Box(
+                    f"{mass.kind}-{counts[mass.kind]}",
+                    mass.kind,
+                    round((x0 + x1) / 2.0, 6),
+                    round((y0 + y1) / 2.0, 6),
+                    round(x1 - x0, 6),
+                    round(y1 - y0, 6),
+                    mass.eaves,
+                    _roof(mass, area, notes),
+                )
+            )
+    return tuple(boxes), parts.residual
+
+
+def _roof(mass: Mass, area: BaseGeometry, notes: Counter[str]) -> Roof:
+    """Return the roof of a box: the body's style and pitch, the ridge as over this box."""
+    whole = roof_of(mass.planes, mass.plan, mass.code, notes)
+    here = roof_of(mass.planes, area, "", Counter())
+    direction = here.direction if here.style == whole.style else whole.direction
+    return Roof(whole.style, round(whole.pitch, 4), direction)
+
+
+def chimneys(
+    model: Model, planes: Sequence[Plane], details: Sequence[Mass], ground: float
+) -> tuple[Chimney, ...]:
+    """Return installations and small roofs that rise out of the roof like a chimney."""
+    found = []
+    solids = [tuple(body) for body in model.outside]
+    solids += [tuple(p.surface for p in mass.planes) for mass in details if mass.plan.area < 4.0]
+    for surfaces in solids:
+        chimney = _chimney(surfaces, planes, ground)
+        if chimney is not None:
+            found.append(chimney)
+    return tuple(found[:100])
+
+
+def _chimney(
+    surfaces: tuple[Surface, ...], planes: Sequence[Plane], ground: float
+) -> Chimney | None:
+    low, high = bounds(surfaces)
+    width, depth = float(high[0] - low[0]), float(high[1] - low[1])
+    middle = (low + high)[:2] / 2.0
+    roof = height_at(planes, middle)
+    upright = min(width, depth) >= 0.2 and max(width, depth) <= CHIMNEY_SIDE
+    if (
+        roof is None
+        or not upright
+        or high[2] < roof + 0.4
+        or max(width, depth) > 4.0 * min(width, depth)
+    ):
+        return None
+    x, y = float(middle[0]), float(middle[1])
+    return Chimney(
+        round(x, 6), round(y, 6), round(width, 6), round(depth, 6), float(high[2]) - ground
+    )

@@ -28,6 +28,10 @@ def start_logging(verbose: int, quiet: bool) -> None:
     logger.propagate = False
 
 
+class ReaderLeft(Exception):
+    """The reader of standard output has had enough (`facade … | head`): no error of ours."""
+
+
 Message = tuple[int, str]  # level and text
 
 
@@ -74,7 +78,7 @@ def explain(error: BaseException, arguments: Sequence[str]) -> int:
     if isinstance(error, click.Abort | KeyboardInterrupt):
         click.echo("facade: interrupted", err=True)
         return 130
-    if isinstance(error, BrokenPipeError):  # the reader of a pipe has had enough
+    if isinstance(error, ReaderLeft):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     if isinstance(error, click.ClickException):

@@ -21,7 +21,7 @@ from facade_tools.parallel import map_ordered
 from facade_tools.randomness import item_generator
 
 from ._options import StreamOptions
-from ._report import Message, Progress, collected_log, say_error, show_messages
+from ._report import Message, Progress, ReaderLeft, collected_log, say_error, show_messages
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +132,6 @@ def open_sink(output: str | None, suffix: str = ".json") -> Iterator[Write]:
     """Open what takes the results: standard output, one file, or a folder with a file an item."""
     if output is None or output == "-":
         yield _to_stdout
-        sys.stdout.buffer.flush()
     elif is_folder(output):
         yield _to_folder(Path(output), suffix)
     else:
@@ -141,8 +140,11 @@ def open_sink(output: str | None, suffix: str = ".json") -> Iterator[Write]:
 
 
 def _to_stdout(_: str, data: bytes) -> None:
-    sys.stdout.buffer.write(data)
-    sys.stdout.buffer.flush()
+    try:
+        sys.stdout.buffer.write(data)
+        sys.stdout.buffer.flush()
+    except BrokenPipeError:
+        raise ReaderLeft from None
 
 
 def _to_file(file: BinaryIO, output: str) -> Write:

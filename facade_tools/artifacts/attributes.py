@@ -75,6 +75,21 @@ class Bounds:
 
 
 @dataclass(frozen=True, slots=True)
+class Sample:
+    """Where a drawn vector comes from.
+
+    style: value of S, from 0. log_density: of all coordinates under the model, nats. neighbours:
+    for each group of attributes the id of the training building nearest in it. effective: effective
+    sample size behind a completion that could not be drawn exactly.
+    """
+
+    style: int = field(metadata=KEEP)
+    log_density: float = field(metadata=KEEP)
+    neighbours: Mapping[str, str] = field(default_factory=dict)
+    effective: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Attributes:
     """Attribute vector of one building: 49 numbers, each possibly unobserved."""
 
@@ -87,5 +102,6 @@ class Attributes:
     storey_height: float = field(default=3.0, metadata=KEEP)
     present: Present | None = None
     bounds: Bounds | None = None
+    sample: Sample | None = None
     tags: Mapping[str, object] = field(default_factory=dict)
     provenance: Provenance | None = None

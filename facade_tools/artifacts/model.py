@@ -20,7 +20,7 @@ class ModelCoordinate:
     """One free coordinate: standardised = (transform(value) − center) / scale.
 
     transform: identity, log, logit or log-above-1 (log(value − 1)). floor: least standard
-    deviation, own unit. part: the channel that says whether it exists.
+    deviation, least and most: range, own unit. part: the channel that says whether it exists.
     """
 
     name: str
@@ -28,6 +28,8 @@ class ModelCoordinate:
     center: float = field(metadata=KEEP)
     scale: float = field(metadata=KEEP)
     floor: float = field(metadata=KEEP)
+    least: float = field(default=0.0, metadata=KEEP)
+    most: float = field(default=1.0, metadata=KEEP)
     atoms: Vector = ()
     part: str | None = None
 

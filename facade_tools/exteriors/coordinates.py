@@ -1,0 +1,170 @@
+"""Attribute vectors to rows of free coordinates and back.
+
+The 49 numbers depend on one another exactly, so the model stands on free coordinates (docs/model.md):
+own units outside, an unbounded standardised scale inside, atoms apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..artifacts.attributes import Attributes
+from .groups import ABSENT, ATOM_TOLERANCE, GROUPS, UNKNOWN, Group, Reading, assemble, declared
+from .layout import GroupLayout, Layout
+
+Floats = NDArray[np.float64]
+Bits = NDArray[np.int8]
+
+UNSEEN = np.int8(-1)  # state of a channel or bit that nobody observed, or that does not apply
+
+
+@dataclass(frozen=True, slots=True)
+class Readings:
+    """Rows in their own units: NaN unobserved, infinite where the part does not exist.
+
+    values: one (n, coordinates) a group; parts: one (n, parts) a group, bits (n, bits); 1, 0, −1.
+    """
+
+    ids: tuple[str, ...]
+    values: tuple[Floats, ...]
+    parts: tuple[Bits, ...]
+    bits: Bits
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    def take(self, rows: NDArray[Any]) -> Readings:
+        """Return the rows named by an index or mask array."""
+        index = np.arange(len(self))[rows]
+        ids = tuple(self.ids[i] for i in index)
+        values, parts = (tuple(a[index] for a in part) for part in (self.values, self.parts))
+        return Readings(ids, values, parts, self.bits[index])
+
+
+def stack(first: Readings, second: Readings) -> Readings:
+    """Return the rows of both."""
+    pairs = [
+        tuple(np.concatenate(pair) for pair in zip(a, b, strict=True))
+        for a, b in ((first.values, second.values), (first.parts, second.parts))
+    ]
+    bits = np.concatenate([first.bits, second.bits])
+    return Readings(first.ids + second.ids, pairs[0], pairs[1], bits)
+
+
+def read_attributes(
+    rows: Iterable[Attributes], layout: Layout, groups: tuple[Group, ...] = GROUPS
+) -> Readings:
+    """Return the free coordinates of attribute vectors; empty input gives empty arrays."""
+    active = declared(layout.boundary, groups)
+    ids: list[str] = []
+    values: list[list[tuple[float, ...]]] = [[] for _ in active]
+    parts: list[list[tuple[int, ...]]] = [[] for _ in active]
+    bits: list[list[int]] = []
+    for row in rows:
+        ids.append(row.id)
+        bits.append([-1 if bit is None else int(bit) for bit in _bits(row, layout)])
+        for i, group in enumerate(active):
+            reading = group.read(row)
+            values[i].append(reading.values)
+            parts[i].append(reading.parts)
+    return Readings(
+        tuple(ids),
+        tuple(
+            _matrix(v, len(g.coordinates), np.float64) for v, g in zip(values, active, strict=True)
+        ),
+        tuple(_matrix(p, len(g.parts), np.int8) for p, g in zip(parts, active, strict=True)),
+        _matrix(bits, len(layout.bits), np.int8),
+    )
+
+
+def _bits(row: Attributes, layout: Layout) -> Iterator[int | None]:
+    for group in layout.bit_groups:
+        vector = getattr(row.element, group.name, {}) or {}
+        yield from (vector.get(bit) for bit in group.bits)
+
+
+def _matrix(rows: Sequence[Sequence[float]], width: int, kind: Any) -> NDArray[Any]:
+    return np.array(rows, dtype=kind).reshape(len(rows), width)
+
+
+def write_attributes(
+    readings: Readings,
+    layout: Layout,
+    storey_height: Floats,
+    groups: tuple[Group, ...] = GROUPS,
+) -> Iterator[Attributes]:
+    """Yield the attribute vectors of complete rows."""
+    active = declared(layout.boundary, groups)
+    values = [v.tolist() for v in readings.values]
+    parts = [p.tolist() for p in readings.parts]
+    bits = readings.bits.tolist()
+    for n, identity in enumerate(readings.ids):
+        fields: dict[str, Any] = {}
+        for i, group in enumerate(active):
+            group.write(fields, Reading(tuple(values[i][n]), tuple(parts[i][n])))
+        yield assemble(identity, fields, _named_bits(bits[n], layout), float(storey_height[n]))
+
+
+def _named_bits(row: list[int], layout: Layout) -> dict[str, dict[str, int]]:
+    out, at = {}, 0
+    for group in layout.bit_groups:
+        out[group.name] = dict(zip(group.bits, row[at : at + len(group.bits)], strict=True))
+        at += len(group.bits)
+    return out
+
+
+def states_of(values: Floats, parts: Bits, group: GroupLayout) -> tuple[Bits, NDArray[np.bool_]]:
+    """Return the channels' states (n, channels) and which coordinates carry a density (n, d).
+
+    values: own units. A value within 1e-6 of an atom is the atom.
+    """
+    states = np.full((len(values), len(group.channels)), UNSEEN, dtype=np.int8)
+    dense = np.isfinite(values)
+    columns = iter(parts.T)
+    for c, channel in enumerate(group.channels):
+        if channel.coordinate < 0:
+            states[:, c] = next(columns)
+            continue
+        column = values[:, channel.coordinate]
+        states[np.isfinite(column), c] = 0
+        for s, atom in enumerate(channel.atoms, start=1):
+            at = np.abs(column - atom) <= ATOM_TOLERANCE
+            states[at, c] = s
+            dense[at, channel.coordinate] = False
+    return states, dense
+
+
+def values_of(values: Floats, states: Bits, group: GroupLayout) -> Floats:
+    """Return own-unit values with atoms put in and what does not exist set to ABSENT."""
+    out = values.copy()
+    for c, channel in enumerate(group.channels):
+        for s, atom in enumerate(channel.atoms, start=1):
+            out[states[:, c] == s, channel.coordinate] = atom
+    for i, part in enumerate(group.part):
+        if part >= 0:
+            out[states[:, part] == 0, i] = ABSENT
+    return out
+
+
+def blank(count: int, layout: Layout, ids: tuple[str, ...]) -> Readings:
+    """Return rows with nothing observed."""
+    values = tuple(np.full((count, len(g.coordinates)), UNKNOWN) for g in layout.groups)
+    parts = tuple(
+        np.full((count, sum(c.coordinate < 0 for c in g.channels)), UNSEEN, dtype=np.int8)
+        for g in layout.groups
+    )
+    return Readings(ids, values, parts, np.full((count, len(layout.bits)), UNSEEN, dtype=np.int8))
+
+
+def join(readings: Readings, layout: Layout) -> Readings:
+    """Return rows of the merged layout (`layout.merged`): all groups side by side."""
+    if len(layout.groups) == len(readings.values):
+        return readings
+    values = np.concatenate(readings.values, axis=1)
+    parts = np.concatenate(readings.parts, axis=1)
+    return Readings(readings.ids, (values,), (parts,), readings.bits)

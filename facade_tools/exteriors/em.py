@@ -1,0 +1,269 @@
+"""MAP-EM for the network (FW16 5.3): Dirichlet and normal-Wishart priors, unobserved handled.
+
+One M-step maximises exactly the expected log posterior under the constraint that no direction has
+less than the least standard deviation, so that the objective never falls.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .coordinates import Floats
+from .dataset import Dataset, GroupData, floors
+from .kernels import moments
+from .network import Family, Network, Posterior, Weights, infer, inputs_of, log_
+
+NOTHING = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Prior:
+    """Strength of the priors, in rows of data.
+
+    style, hidden, table, bit: Dirichlet pseudo-counts, spread evenly over the states (hidden: over
+    the group's own cluster shares). mean: of cluster means around the overall mean. slope: of
+    lateral coefficients around 0. spread, freedom: inverse Wishart with mode about `spread` times
+    the overall variance.
+    """
+
+    style: float = 1.0
+    hidden: float = 1.0
+    table: float = 1.0
+    bit: float = 1.0
+    mean: float = 0.05
+    slope: float = 1.0
+    spread: float = 0.1
+    freedom: float = 2.0
+
+
+def unit_weights(data: Dataset) -> Weights:
+    """Return weights of one."""
+    one = np.ones(len(data))
+    return Weights(one, tuple(one for _ in data.groups), np.ones(data.bits.shape))
+
+
+@dataclass(frozen=True, slots=True)
+class Statistics:
+    """Expected moments of one family (`kernels.moments`), its tables and hidden counts."""
+
+    uu: Floats
+    xu: Floats
+    xx: Floats
+    tables: tuple[Floats, ...]
+    hidden: Floats
+
+
+# --- M-step -------------------------------------------------------------------------------------
+
+
+def prior_precision(width: int, prior: Prior) -> Floats:
+    """Return the diagonal of the prior precision of (intercept, slopes)."""
+    return np.concatenate([[prior.mean], np.full(width - 1, prior.slope)])
+
+
+def fit_gaussian(
+    uu: Floats, xu: Floats, xx: Floats, floor: Floats, prior: Prior
+) -> tuple[Floats, Floats]:
+    """Return the MAP coef (K, d, 1+q) and cov (K, d, d) from expected moments.
+
+    floor (K, d): no direction gets a smaller standard deviation, measured against it.
+    """
+    d, width = xu.shape[1:]
+    a = uu + np.diag(prior_precision(width, prior))
+    coef = np.linalg.solve(a, np.swapaxes(xu, 1, 2)).swapaxes(1, 2)
+    scatter = xx - coef @ a @ np.swapaxes(coef, 1, 2)
+    freedom = d + prior.freedom
+    total = uu[:, 0, 0][:, None, None] + freedom + d + 1 + width
+    return coef, clip(_wishart_scale(d, prior) + scatter, total, floor)
+
+
+def _wishart_scale(d: int, prior: Prior) -> Floats:
+    return np.eye(d) * prior.spread * (2 * d + 2 + prior.freedom)
+
+
+def clip(scatter: Floats, total: Floats, floor: Floats) -> Floats:
+    """Return scatter / total, no direction below the floor (K, d)."""
+    scaled = scatter / total / floor[:, :, None] / floor[:, None, :]
+    scaled = (scaled + np.swapaxes(scaled, 1, 2)) / 2
+    values, vectors = np.linalg.eigh(scaled)
+    if values.size and values.min() < 1.0:
+        scaled = (vectors * np.maximum(values, 1.0)[:, None, :]) @ np.swapaxes(vectors, 1, 2)
+    return scaled * floor[:, :, None] * floor[:, None, :]
+
+
+def fit_table(counts: Floats, strength: float) -> Floats:
+    """Return MAP probabilities (rows) under a Dirichlet of `strength` pseudo-counts a row."""
+    full = counts + strength / counts.shape[-1]
+    return full / full.sum(axis=-1, keepdims=True)
+
+
+def statistics(
+    family: Family, data: GroupData, features: Floats, weight: Floats, hidden: Floats
+) -> Statistics:
+    """Return expected moments under cluster weights (n, K)."""
+    z = inputs_of(family, features)
+    weight = np.ascontiguousarray(weight)
+    uu, xu, xx = moments(
+        data.x, z, data.order, data.starts, data.masks, family.coef, family.cov, weight
+    )
+    tables = tuple(
+        np.stack([weight[data.states[:, c] == s].sum(axis=0) for s in range(t.shape[1])], axis=1)
+        for c, t in enumerate(family.tables)
+    )
+    return Statistics(uu, xu, xx, tables, hidden)
+
+
+def maximise(family: Family, stats: Statistics, floor: Floats, prior: Prior) -> Family:
+    """Return the family at the maximum of its part of the expected log posterior."""
+    coef, cov = fit_gaussian(stats.uu, stats.xu, stats.xx, floor, prior)
+    tables = tuple(fit_table(t, prior.table) for t in stats.tables)
+    hidden = family.hidden if family.direct else fit_table(stats.hidden, prior.hidden)
+    return replace(family, hidden=hidden, tables=tables, coef=coef, cov=cov)
+
+
+# --- prior density ------------------------------------------------------------------------------
+
+
+def log_prior(network: Network, prior: Prior) -> float:
+    """Return the log prior density of all parameters, up to a constant of the structure."""
+    total = _log_dirichlet(network.style[None], prior.style)
+    both = np.stack([network.bits, 1 - network.bits], axis=-1)
+    total += _log_dirichlet(both, prior.bit)
+    for family in network.families:
+        if not family.direct:
+            total += _log_dirichlet(family.hidden, prior.hidden)
+        total += sum(_log_dirichlet(t, prior.table) for t in family.tables)
+        total += _log_normal_wishart(family, prior)
+    return float(total)
+
+
+def _log_dirichlet(p: Floats, strength: float) -> float:
+    """Pseudo-counts c a state are the density Π p^c (the Dirichlet with parameters 1 + c)."""
+    return float(strength / p.shape[-1] * log_(p).sum())
+
+
+def _log_normal_wishart(family: Family, prior: Prior) -> float:
+    d, width = family.coef.shape[1:]
+    if d == 0:
+        return 0.0
+    precision = np.diag(prior_precision(width, prior))
+    scatter = _wishart_scale(d, prior) + family.coef @ precision @ family.coef.swapaxes(1, 2)
+    power = d + prior.freedom + d + 1 + width
+    logdet = np.linalg.slogdet(family.cov)[1]
+    trace = np.trace(np.linalg.solve(family.cov, scatter), axis1=1, axis2=2)
+    return float(-0.5 * (power * logdet + trace).sum())
+
+
+# --- the loop -----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """When EM ends: relative change of the objective, or (parameters) their largest change."""
+
+    relative: float = 1e-5
+    parameters: float | None = None
+    iterations: int = 200
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """A fitted network, its objective after every iteration, and the last E-step."""
+
+    network: Network
+    trace: tuple[float, ...]
+    posterior: Posterior
+
+
+def cluster_floors(
+    network: Network, data: Dataset, weights: Weights, posterior: Posterior
+) -> tuple[Floats, ...]:
+    """Return the least standard deviations (K, d) around each cluster's mean row."""
+    out = []
+    for g, family in enumerate(network.families):
+        share = posterior.clusters[g] * weights.groups[g][:, None]
+        share = share * data.groups[g].dense.any(axis=1, keepdims=True)
+        center = share.T @ inputs_of(family, data.features)
+        center /= np.maximum(share.sum(axis=0), NOTHING)[:, None]
+        mean = family.coef[:, :, 0] + np.einsum("kdq,kq->kd", family.coef[:, :, 1:], center)
+        out.append(floors(mean, network.layout.groups[g], network.scalings[g]))
+    return tuple(out)
+
+
+def step(
+    network: Network,
+    data: Dataset,
+    weights: Weights,
+    floor: tuple[Floats, ...],
+    prior: Prior,
+    posterior: Posterior,
+) -> Network:
+    """Return the network after one M-step from `posterior`, its own E-step."""
+    families = []
+    for g, family in enumerate(network.families):
+        weight = posterior.clusters[g] * weights.groups[g][:, None]
+        stats = statistics(family, data.groups[g], data.features, weight, posterior.joint[g])
+        families.append(maximise(family, stats, floor[g], prior))
+    style = fit_table(weights.style @ posterior.style, prior.style)
+    bits = fit_bits(data, weights, posterior.style, prior)
+    return replace(network, style=style, bits=bits, families=tuple(families))
+
+
+def fit_bits(data: Dataset, weights: Weights, style: Floats, prior: Prior) -> Floats:
+    """Return the MAP probability of each bit given S, (|S|, b)."""
+    one = style.T @ (weights.bits * (data.bits == 1))
+    zero = style.T @ (weights.bits * (data.bits == 0))
+    return np.asarray((one + prior.bit / 2) / (one + zero + prior.bit))
+
+
+def objective(network: Network, posterior: Posterior, weights: Weights, prior: Prior) -> float:
+    """Return weighted log likelihood plus log prior."""
+    return float(weights.style @ posterior.log_density) + log_prior(network, prior)
+
+
+def run(
+    network: Network,
+    data: Dataset,
+    prior: Prior,
+    *,
+    weights: Weights | None = None,
+    stop: Stop = Stop(),
+    floor: tuple[Floats, ...] | None = None,
+) -> Fit:
+    """Run EM from `network`; the trace never falls under fixed floors and unit weights."""
+    weights = weights or unit_weights(data)
+    posterior = infer(network, data, weights)
+    floor = floor or cluster_floors(network, data, weights, posterior)
+    trace = [objective(network, posterior, weights, prior)]
+    for _ in range(stop.iterations):
+        before = network
+        network = step(network, data, weights, floor, prior, posterior)
+        posterior = infer(network, data, weights)
+        trace.append(objective(network, posterior, weights, prior))
+        if _settled(trace, before, network, stop):
+            break
+    return Fit(network, tuple(trace), posterior)
+
+
+def _settled(trace: list[float], before: Network, after: Network, stop: Stop) -> bool:
+    if stop.parameters is not None:
+        return largest_change(before, after) < stop.parameters
+    return abs(trace[-1] - trace[-2]) <= stop.relative * abs(trace[-1])
+
+
+def largest_change(before: Network, after: Network) -> float:
+    """Return the largest absolute change of any parameter."""
+    return max(
+        float(np.max(np.abs(a - b), initial=0.0))
+        for a, b in zip(parameters(before), parameters(after), strict=True)
+    )
+
+
+def parameters(network: Network) -> list[Floats]:
+    """Return all parameter arrays."""
+    out = [network.style, network.bits]
+    for family in network.families:
+        out += [family.hidden, family.coef, family.cov, *family.tables]
+    return out

@@ -1,0 +1,222 @@
+"""Compiled inner loops of EM: Gaussians given their parents, with unobserved coordinates.
+
+Rows come sorted by pattern (which coordinates carry a density): `order` lists them, pattern p owns
+`order[starts[p]:starts[p + 1]]` and `masks[p]`. The conditional mean of cluster k is
+coef[k] @ (1, inputs). Scalar code, no fast-math: the same path on every machine.
+"""
+
+from __future__ import annotations
+
+from math import log, pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiled import compiled
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Masks = NDArray[np.bool_]
+
+LOG_2PI = log(2.0 * pi)
+NEGLIGIBLE = 1e-9  # a responsibility below it adds nothing
+
+
+@compiled
+def cholesky(a: Floats, size: int) -> float:
+    """Replace the lower triangle of a by its Cholesky factor; return log det a (nan: not p.d.)."""
+    logdet = 0.0
+    for i in range(size):
+        for j in range(i + 1):
+            total = a[i, j]
+            for m in range(j):
+                total -= a[i, m] * a[j, m]
+            if i == j:
+                if total <= 0.0:
+                    return np.nan
+                a[i, i] = np.sqrt(total)
+                logdet += 2.0 * np.log(a[i, i])
+            else:
+                a[i, j] = total / a[j, j]
+    return logdet
+
+
+@compiled
+def chosen(mask: Masks, out: Ints) -> int:
+    """Write the indices of true entries to `out`; return how many."""
+    count = 0
+    for i in range(mask.shape[0]):
+        if mask[i]:
+            out[count] = i
+            count += 1
+    return count
+
+
+@compiled
+def residual(coef: Floats, z: Floats, x: Floats, index: Ints, size: int, out: Floats) -> None:
+    """Write x − coef @ (1, z) of the chosen coordinates to `out`."""
+    for a in range(size):
+        i = index[a]
+        mean = coef[i, 0]
+        for q in range(z.shape[0]):
+            mean += coef[i, q + 1] * z[q]
+        out[a] = x[i] - mean
+
+
+@compiled
+def solve_lower(factor: Floats, size: int, v: Floats) -> None:
+    """Replace v by L⁻¹ v."""
+    for i in range(size):
+        total = v[i]
+        for j in range(i):
+            total -= factor[i, j] * v[j]
+        v[i] = total / factor[i, i]
+
+
+@compiled
+def solve_upper(factor: Floats, size: int, v: Floats) -> None:
+    """Replace v by L⁻ᵀ v."""
+    for i in range(size - 1, -1, -1):
+        total = v[i]
+        for j in range(i + 1, size):
+            total -= factor[j, i] * v[j]
+        v[i] = total / factor[i, i]
+
+
+@compiled
+def gaussian(
+    x: Floats, z: Floats, order: Ints, starts: Ints, masks: Masks, coef: Floats, cov: Floats
+) -> Floats:
+    """Return log N(x observed | coef[k] (1, z), cov[k]): (n, K); rows without any give 0."""
+    clusters, d = coef.shape[0], coef.shape[1]
+    out = np.zeros((x.shape[0], clusters))
+    index = np.empty(d, np.int64)
+    factor = np.empty((d, d))
+    v = np.empty(d)
+    for p in range(masks.shape[0]):
+        size = chosen(masks[p], index)
+        if size == 0:
+            continue
+        for k in range(clusters):
+            for a in range(size):
+                for b in range(size):
+                    factor[a, b] = cov[k, index[a], index[b]]
+            constant = -0.5 * (cholesky(factor, size) + size * LOG_2PI)
+            for r in range(starts[p], starts[p + 1]):
+                n = order[r]
+                residual(coef[k], z[n], x[n], index, size, v)
+                solve_lower(factor, size, v)
+                total = 0.0
+                for a in range(size):
+                    total += v[a] * v[a]
+                out[n, k] = constant - 0.5 * total
+    return out
+
+
+@compiled
+def fill_mean(
+    cov: Floats, factor: Floats, mask: Masks, index: Ints, size: int, v: Floats, out: Floats
+) -> None:
+    """Write E[residual of every coordinate | residuals v of the observed ones] to `out`.
+
+    v is overwritten by cov_oo⁻¹ v.
+    """
+    d = mask.shape[0]
+    if size == d:
+        out[:] = v
+        return
+    for a in range(size):
+        out[index[a]] = v[a]
+    solve_lower(factor, size, v)
+    solve_upper(factor, size, v)
+    for i in range(d):
+        if not mask[i]:
+            total = 0.0
+            for a in range(size):
+                total += cov[i, index[a]] * v[a]
+            out[i] = total
+
+
+@compiled
+def spread(cov: Floats, factor: Floats, mask: Masks, index: Ints, size: int, out: Floats) -> None:
+    """Write the covariance of the unobserved coordinates given the observed ones to `out`."""
+    d = mask.shape[0]
+    out[:] = 0.0
+    if size == d:
+        return
+    half = np.empty((d, size))
+    for i in range(d):
+        if not mask[i]:
+            for a in range(size):
+                half[i, a] = cov[i, index[a]]
+            solve_lower(factor, size, half[i])
+    for i in range(d):
+        for j in range(d):
+            if not mask[i] and not mask[j]:
+                total = cov[i, j]
+                for a in range(size):
+                    total -= half[i, a] * half[j, a]
+                out[i, j] = total
+
+
+@compiled
+def moments(
+    x: Floats,
+    z: Floats,
+    order: Ints,
+    starts: Ints,
+    masks: Masks,
+    coef: Floats,
+    cov: Floats,
+    weight: Floats,
+) -> tuple[Floats, Floats, Floats]:
+    """Return expected moments a cluster, weighted by weight (n, K).
+
+    Σ w u uᵀ (K, 1+q, 1+q) with u = (1, z); Σ w E[x] uᵀ (K, d, 1+q); Σ w E[x xᵀ] (K, d, d).
+    Rows that observe no coordinate are left out: they say nothing.
+    """
+    clusters, d, width = coef.shape
+    uu = np.zeros((clusters, width, width))
+    xu = np.zeros((clusters, d, width))
+    xx = np.zeros((clusters, d, d))
+    index = np.empty(d, np.int64)
+    factor = np.empty((d, d))
+    extra = np.empty((d, d))
+    v = np.empty(d)
+    full = np.empty(d)
+    u = np.ones(width)
+    for p in range(masks.shape[0]):
+        size = chosen(masks[p], index)
+        if size == 0:
+            continue
+        for k in range(clusters):
+            for a in range(size):
+                for b in range(size):
+                    factor[a, b] = cov[k, index[a], index[b]]
+            cholesky(factor, size)
+            spread(cov[k], factor, masks[p], index, size, extra)
+            mass = 0.0
+            for r in range(starts[p], starts[p + 1]):
+                n = order[r]
+                w = weight[n, k]
+                if w < NEGLIGIBLE:
+                    continue
+                mass += w
+                for q in range(1, width):
+                    u[q] = z[n, q - 1]
+                residual(coef[k], z[n], x[n], index, size, v)
+                fill_mean(cov[k], factor, masks[p], index, size, v, full)
+                for i in range(d):
+                    for q in range(width):
+                        full[i] += coef[k, i, q] * u[q]
+                for q in range(width):
+                    for m in range(width):
+                        uu[k, q, m] += w * u[q] * u[m]
+                for i in range(d):
+                    for q in range(width):
+                        xu[k, i, q] += w * full[i] * u[q]
+                    for j in range(d):
+                        xx[k, i, j] += w * full[i] * full[j]
+            if size < d:
+                xx[k] += mass * extra
+    return uu, xu, xx

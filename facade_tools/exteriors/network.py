@@ -1,0 +1,187 @@
+"""The hierarchical network (FW16 5.2) as arrays: S, hidden variables, groups, lateral edges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .coordinates import Bits, Floats
+from .dataset import Dataset, GroupData, Scaling
+from .kernels import gaussian
+from .layout import GroupLayout, Layout
+
+LEAST_PROBABILITY = 1e-300
+
+
+@dataclass(frozen=True, slots=True)
+class Family:
+    """One group's conditional distributions.
+
+    hidden (|S|, K): P(H | S); of a group that hangs on S itself, the unit matrix and `direct`.
+    tables: P(state | H) a channel, (K, states). inputs: features of other groups, by number.
+    coef (K, d, 1 + inputs), cov (K, d, d): conditional linear Gaussian, standardised.
+    """
+
+    hidden: Floats
+    tables: tuple[Floats, ...]
+    inputs: tuple[int, ...]
+    coef: Floats
+    cov: Floats
+    direct: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Network:
+    """A model as arrays. style (|S|,): P(S); bits (|S|, b): P(bit = 1 | S)."""
+
+    layout: Layout
+    scalings: tuple[Scaling, ...]
+    style: Floats
+    bits: Floats
+    families: tuple[Family, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Weights:
+    """Weight of each row: on S (n,), on each group (n,), and on each bit (n, b)."""
+
+    style: Floats
+    groups: tuple[Floats, ...]
+    bits: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Posterior:
+    """What an E-step finds for n rows.
+
+    log_density (n,): of standardised coordinates. style (n, |S|): P(S | row). clusters: P(H | row)
+    a group, (n, K). joint: Σ rows P(S, H | row) a group, (|S|, K).
+    """
+
+    log_density: Floats
+    style: Floats
+    clusters: tuple[Floats, ...]
+    joint: tuple[Floats, ...]
+
+
+def log_(p: Floats) -> Floats:
+    """Return the logarithm; of zero, a very low number."""
+    return np.log(np.maximum(p, LEAST_PROBABILITY))
+
+
+def local_log_density(family: Family, data: GroupData, features: Floats) -> Floats:
+    """Return log P(group | H) (n, K): atoms and what is dense; the unobserved integrated out."""
+    out = gaussian(data.x, inputs_of(family, features), data.order, data.starts, data.masks,
+                   family.coef, family.cov)  # fmt: skip
+    for c, table in enumerate(family.tables):
+        padded = np.concatenate([log_(table), np.zeros((len(table), 1))], axis=1)
+        out += padded.T[data.states[:, c]]  # state −1 takes the last column: unknown
+    return out
+
+
+def inputs_of(family: Family, features: Floats) -> Floats:
+    """Return the features that the group's lateral parents show, (n, inputs)."""
+    return np.ascontiguousarray(features[:, family.inputs])
+
+
+def bit_log_density(probability: Floats, bits: Bits) -> Floats:
+    """Return log P(observed bits | S), (n, |S|)."""
+    one, zero = (bits == 1).astype(np.float64), (bits == 0).astype(np.float64)
+    total: Floats = one @ log_(probability).T + zero @ log_(1.0 - probability).T
+    return total
+
+
+def log_sum(a: Floats) -> Floats:
+    """Return log Σ exp over the last axis."""
+    top = a.max(axis=-1, keepdims=True)
+    total: Floats = np.log(np.exp(a - top).sum(axis=-1)) + top[..., 0]
+    return total
+
+
+def marginal(family: Family, local: Floats) -> Floats:
+    """Return log P(group | S) (n, |S|): the hidden variable summed out."""
+    if family.direct:
+        return local
+    top = local.max(axis=1, keepdims=True)
+    return log_(np.exp(local - top) @ family.hidden.T) + top
+
+
+def infer(network: Network, data: Dataset, weights: Weights | None = None) -> Posterior:
+    """E-step: exact posterior of S and of every hidden variable, and the density of every row.
+
+    weights: of the rows in `joint`; 1 without. Lateral parents must be known where their children
+    are observed (`density.log_density` treats other rows).
+    """
+    local = [
+        local_log_density(family, group, data.features)
+        for family, group in zip(network.families, data.groups, strict=True)
+    ]
+    joint = bit_log_density(network.bits, data.bits) + log_(network.style)
+    messages = [marginal(f, table) for f, table in zip(network.families, local, strict=True)]
+    for message in messages:
+        joint = joint + message
+    log_density = log_sum(joint)
+    style = np.exp(joint - log_density[:, None])
+    rows = weights.groups if weights else [None] * len(local)
+    pairs = [
+        _clusters(family, table, message, style, weight)
+        for family, table, message, weight in zip(
+            network.families, local, messages, rows, strict=True
+        )
+    ]
+    return Posterior(log_density, style, tuple(p[0] for p in pairs), tuple(p[1] for p in pairs))
+
+
+def _clusters(
+    family: Family, local: Floats, message: Floats, style: Floats, weight: Floats | None
+) -> tuple[Floats, Floats]:
+    """Return P(H | row) (n, K) and Σ P(S, H | row) (|S|, K)."""
+    weight = np.ones(len(style)) if weight is None else weight
+    if family.direct:
+        return style, np.diag(weight @ style)
+    top = local.max(axis=1, keepdims=True)
+    likelihood = np.exp(local - top)
+    share = style * np.exp(np.minimum(top - message, 700.0))
+    clusters = likelihood * (share @ family.hidden)
+    joint = family.hidden * ((share * weight[:, None]).T @ likelihood)
+    return clusters, joint
+
+
+def topological(families: tuple[Family, ...], layout: Layout) -> list[int]:
+    """Return the groups so that lateral parents come first. Raises ValueError on a cycle."""
+    parents = [{layout.feature_group[i] for i in f.inputs} - {-1} for f in families]
+    done: list[int] = []
+    while len(done) < len(families):
+        ready = [g for g, p in enumerate(parents) if g not in done and p <= set(done)]
+        if not ready:
+            raise ValueError("lateral edges form a cycle")
+        done.append(ready[0])
+    return done
+
+
+def edges(network: Network) -> list[tuple[str, str]]:
+    """Return the lateral edges as names (parent, child); a vector of bits is one parent."""
+    out = []
+    for family, group in zip(network.families, network.layout.groups, strict=True):
+        names = {_owner(network.layout, feature) for feature in family.inputs}
+        out += [(name, group.name) for name in sorted(names)]
+    return out
+
+
+def _owner(layout: Layout, feature: int) -> str:
+    group = layout.feature_group[feature]
+    return layout.groups[group].name if group >= 0 else layout.features[feature].split(".")[0]
+
+
+def empty_family(group: GroupLayout, styles: int, clusters: int) -> Family:
+    """Return a family that knows nothing: standard normal, uniform tables."""
+    d = len(group.coordinates)
+    tables = tuple(np.full((clusters, len(c.states)), 1 / len(c.states)) for c in group.channels)
+    return Family(
+        np.full((styles, clusters), 1 / clusters),
+        tables,
+        (),
+        np.zeros((clusters, d, 1)),
+        np.tile(np.eye(d), (clusters, 1, 1)),
+    )

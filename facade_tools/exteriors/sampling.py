@@ -1,0 +1,128 @@
+"""Ancestral draws from a model (FW16 5.2), in blocks, so that row i is the same for any n."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from .coordinates import Bits, Floats, Readings, values_of
+from .dataset import Ints, Masks, own_units
+from .groups import ABSENT
+from .layout import GroupLayout, Layout
+from .network import Family, Network, bit_log_density, topological
+from .physical import settle
+
+BLOCK = 1024
+
+
+@dataclass(frozen=True, slots=True)
+class Draws:
+    """n complete rows and the style each was drawn from."""
+
+    readings: Readings
+    style: Ints
+
+
+def draw_blocks(
+    network: Network, *, rng: np.random.Generator, style: int | None = None
+) -> Iterator[Draws]:
+    """Yield blocks of draws without end; `style` fixes S."""
+    while True:
+        yield draw_block(network, rng=rng, style=style)
+
+
+def draw_block(network: Network, *, rng: np.random.Generator, style: int | None = None) -> Draws:
+    """Return one block of ancestral draws, moved onto what is possible."""
+    styles = _pick(np.tile(network.style, (BLOCK, 1)), rng)
+    if style is not None:
+        styles = np.full(BLOCK, style)
+    bits = _draw_bits(network, styles, rng)
+    drawn = draw_groups(network, styles, rng)
+    values = tuple(v for v, _ in drawn)
+    parts = tuple(p for _, p in drawn)
+    settle(values, network.layout)
+    return Draws(Readings(("",) * BLOCK, values, parts, bits), styles)
+
+
+def _pick(probabilities: Floats, rng: np.random.Generator) -> Ints:
+    """Return one index a row of probabilities."""
+    u = rng.random((len(probabilities), 1))
+    cumulative = np.cumsum(probabilities, axis=1)
+    index = (u * cumulative[:, -1:] > cumulative).sum(axis=1)
+    return np.minimum(index, probabilities.shape[1] - 1)
+
+
+def _draw_bits(network: Network, styles: Ints, rng: np.random.Generator) -> Bits:
+    """Return bits (n, b); every building has at least one kind of roof."""
+    probability = network.bits[styles]
+    bits = (rng.random(probability.shape) < probability).astype(np.int8)
+    roofs = [i for i, name in enumerate(network.layout.bits) if name.startswith("roof.")]
+    if roofs:
+        words = np.array(list(product((0, 1), repeat=len(roofs)))[1:], dtype=np.int8)
+        odds = np.exp(bit_log_density(probability[:, roofs], words)).T + 1e-300
+        bits[:, roofs] = words[_pick(odds / odds.sum(axis=1, keepdims=True), rng)]
+    return bits
+
+
+def draw_groups(
+    network: Network, styles: Ints, rng: np.random.Generator
+) -> list[tuple[Floats, Bits]]:
+    """Return own-unit values and parts of every group, parents before children."""
+    layout, count = network.layout, len(styles)
+    shown = np.zeros((count, len(layout.features)))
+    out: dict[int, tuple[Floats, Bits]] = {}
+    for g in topological(network.families, layout):
+        family, group = network.families[g], layout.groups[g]
+        clusters = styles if family.direct else _pick(family.hidden[styles], rng)
+        states = np.stack(
+            [_pick(table[clusters], rng) for table in family.tables] or [np.zeros(count)], axis=1
+        ).astype(np.int8)[:, : len(family.tables)]
+        x = draw_normal(family, clusters, shown, rng)
+        values = values_of(own_units(x, group, network.scalings[g]), states, group)
+        if group.name == "arf" and "r1" in layout.features:
+            values[_flat(layout, shown)] = ABSENT
+        show(shown, x, values, states, group, layout, g)
+        out[g] = (values, _parts(states, group))
+    return [out[g] for g in range(len(layout.groups))]
+
+
+def _flat(layout: Layout, shown: Floats) -> Masks:
+    return shown[:, layout.features.index("r1=0")] == 1
+
+
+def _parts(states: Bits, group: GroupLayout) -> Bits:
+    return states[:, [i for i, c in enumerate(group.channels) if c.coordinate < 0]]
+
+
+def draw_normal(family: Family, clusters: Ints, shown: Floats, rng: np.random.Generator) -> Floats:
+    """Return standardised coordinates given clusters and what the parents show."""
+    count, d = len(clusters), family.coef.shape[1]
+    noise = rng.standard_normal((count, d))
+    factor = np.linalg.cholesky(family.cov)
+    mean = family.coef[clusters, :, 0]
+    if family.inputs:
+        slopes = family.coef[clusters, :, 1:]
+        mean = mean + np.einsum("ndq,nq->nd", slopes, shown[:, family.inputs])
+    return np.asarray(mean + np.einsum("nde,ne->nd", factor[clusters], noise))
+
+
+def show(
+    shown: Floats, x: Floats, values: Floats, states: Bits, group: GroupLayout,
+    layout: Layout, g: int,
+) -> None:  # fmt: skip
+    """Write what children see of group g into `shown` (as `dataset` does for data)."""
+    at = layout.feature_group.index(g) if group.features else 0
+    for i, channel in enumerate(group.channel_of):
+        dense = np.isfinite(values[:, i])
+        if channel >= 0:
+            dense &= states[:, channel] == 0
+        shown[:, at] = np.where(dense, x[:, i], 0.0)
+        at += 1
+    for c, channel in enumerate(group.channels):
+        exists = np.isfinite(values[:, channel.coordinate]) if channel.coordinate >= 0 else True
+        for s in range(1, len(channel.states)):
+            shown[:, at] = (states[:, c] == s) & exists
+            at += 1

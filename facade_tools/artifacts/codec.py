@@ -18,7 +18,7 @@ from .numbers import Given
 T = TypeVar("T")
 Convert = Callable[[Any], Any]
 
-_PLAIN = (float, int, str, bool, Given, type(None))
+_PLAIN = frozenset({float, int, str, bool, Given, type(None)})
 
 
 def from_json(cls: type[T], document: Mapping[str, Any]) -> T:
@@ -50,15 +50,9 @@ def to_json(value: Any) -> Any:
 @cache
 def _object_encoder(cls: Any) -> Convert:
     rows = [
-        (field.name, field.default, bool(field.metadata.get("keep")))
+        (field.name, _default(field), bool(field.metadata.get("keep")))
         for field in dataclasses.fields(cls)
     ]
-    empty = {
-        field.name: field.default_factory()
-        for field in dataclasses.fields(cls)
-        if field.default_factory is not dataclasses.MISSING
-    }
-
     name_of_kind = getattr(cls, "kind", None)  # an artifact, also inside another one
     head = {"schema": f"facade-tools/{name_of_kind}/1"} if isinstance(name_of_kind, str) else {}
 
@@ -66,11 +60,16 @@ def _object_encoder(cls: Any) -> Convert:
         out: dict[str, Any] = dict(head)
         for name, default, keep in rows:
             item = getattr(value, name)
-            if keep or (item is not default and item != empty.get(name, default)):
-                out[name] = to_json(item)
+            if keep or (item is not default and item != default):
+                out[name] = item if type(item) in _PLAIN else to_json(item)
         return out
 
     return encode
+
+
+def _default(field: dataclasses.Field[Any]) -> Any:
+    factory = field.default_factory
+    return field.default if factory is dataclasses.MISSING else factory()
 
 
 @cache

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 SIGNIFICANT_DIGITS = 12
+_AS_IT_IS = frozenset({str, int, bool, type(None)})
 
 
 class Given(float):
@@ -48,12 +49,14 @@ def canonical(value: Any) -> Any:
     kind = type(value)
     if kind is float:
         return _rounded(value)
-    if kind is str or kind is int or kind is bool or value is None:
+    if kind in _AS_IT_IS:
         return value
     if kind is dict:
-        return {key: canonical(item) for key, item in value.items()}
+        return {
+            key: item if type(item) in _AS_IT_IS else canonical(item) for key, item in value.items()
+        }
     if kind is list or kind is tuple:
-        return [canonical(item) for item in value]
+        return [item if type(item) in _AS_IT_IS else canonical(item) for item in value]
     return _canonical_special(value)
 
 
@@ -70,6 +73,8 @@ def _canonical_special(value: Any) -> Any:
 
 
 def _rounded(value: float) -> float:
+    if value.is_integer() and abs(value) < 1e12:
+        return value + 0.0
     if not math.isfinite(value):
         raise ValueError(f"{value} cannot be written as JSON")
     return float(f"{value:.12g}") + 0.0

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import math
+from pathlib import Path
 
 import numpy as np
+import shapely
 
 from facade_tools.artifacts.building import Box, Building, Chimney, Roof
 
@@ -130,3 +133,90 @@ def polygons() -> dict[str, Polygon]:
         "spike": [[(0, 0), (20, 0), (20, 10), (10.01, 10), (10, 0.5), (9.99, 10), (0, 10)]],
         "wedge": [[(0, 0), (40, 0), (40, 0.2)]],
     }
+
+
+def random_polygon(rng: np.random.Generator, kind: str) -> Polygon:
+    """A random valid polygon of at most 100 vertices, often with holes.
+
+    kind: "cells" (rectilinear on a grid, full of simultaneous events), "boxes" (rectilinear, off
+    the grid), "star" (no holes), "blobs" (a union of triangles less other triangles).
+    """
+    while True:
+        shape = _RANDOM[kind](rng)
+        parts = [part for part in shapely.get_parts(shape) if part.geom_type == "Polygon"]
+        if parts:
+            rings = _rings(max(parts, key=lambda part: part.area))
+            if sum(len(ring) for ring in rings) <= 100:
+                return rings
+
+
+POLYGON_KINDS = ("cells", "boxes", "star", "blobs")
+
+
+def _rings(polygon: shapely.Polygon) -> Polygon:
+    loops = [polygon.exterior, *polygon.interiors]
+    return [[(float(x), float(y)) for x, y in loop.coords[:-1]] for loop in loops]
+
+
+def _cells(rng: np.random.Generator) -> shapely.Geometry:
+    size = int(rng.integers(2, 9))
+    filled = np.argwhere(rng.random((size, size)) < 0.7)
+    union = shapely.union_all([shapely.box(x, y, x + 1, y + 1) for x, y in filled.tolist()])
+    return shapely.simplify(union, 0) if rng.random() < 0.7 else union
+
+
+def _boxes(rng: np.random.Generator) -> shapely.Geometry:
+    corners = rng.uniform(0, 20, (int(rng.integers(1, 14)), 2))
+    sizes = rng.uniform(1, 9, corners.shape)
+    return shapely.union_all(
+        [shapely.box(*c, *(c + s)) for c, s in zip(corners, sizes, strict=True)]
+    )
+
+
+def _star(rng: np.random.Generator) -> shapely.Geometry:
+    count = int(rng.integers(3, 101))
+    angles = np.sort(rng.uniform(0, 2 * np.pi, count))
+    radii = rng.uniform(2, 10, count)
+    ring = np.column_stack([radii * np.cos(angles), radii * np.sin(angles)])
+    polygon = shapely.Polygon(ring)
+    return polygon if polygon.is_valid else shapely.Point()
+
+
+def _blobs(rng: np.random.Generator) -> shapely.Geometry:
+    added = [shapely.Polygon(rng.uniform(0, 20, (3, 2))) for _ in range(int(rng.integers(2, 14)))]
+    cut = [shapely.Polygon(rng.uniform(0, 20, (1, 2)) + rng.uniform(-2, 2, (3, 2))) for _ in added]
+    return shapely.difference(shapely.union_all(added), shapely.union_all(cut))
+
+
+_RANDOM = {"cells": _cells, "boxes": _boxes, "star": _star, "blobs": _blobs}
+
+
+def real_footprints(shared_data: Path) -> dict[str, Polygon]:
+    """Ground polygons of every building and part in the CityJSON files of the shared data."""
+    found: dict[str, Polygon] = {}
+    for folder in ("nrw-lod2", "ingolstadt-lod3"):
+        for path in sorted((shared_data / "buildings" / folder).glob("*.city.json")):
+            city = json.loads(path.read_text())
+            for name, thing in city["CityObjects"].items():
+                for k, polygon in enumerate(_ground(city, thing)):
+                    found[f"{path.name}/{name}/{k}"] = polygon
+    return found
+
+
+def _ground(city: dict, thing: dict) -> list[Polygon]:
+    """The union, in plan, of all that is not upright in the surfaces of one city object."""
+    scale, shift = (np.array(city["transform"][key]) for key in ("scale", "translate"))
+    vertices = np.array(city["vertices"]) * scale + shift - np.round(shift)
+    shapes = []
+    for geometry in thing.get("geometry", []):
+        solid = geometry["type"] == "Solid"
+        for surface in (
+            s for shell in geometry["boundaries"] for s in (shell if solid else [shell])
+        ):
+            rings = [vertices[ring][:, :2] for ring in surface if len(ring) >= 3]
+            if rings:
+                shapes.append(shapely.make_valid(shapely.Polygon(rings[0], rings[1:])))
+    flat = [part for part in shapely.get_parts(shapes) if part.area > 1e-4]
+    union = shapely.set_precision(shapely.union_all(flat), 0.001)
+    parts = [part for part in shapely.get_parts(union) if part.geom_type == "Polygon"]
+    return [_rings(part) for part in parts]

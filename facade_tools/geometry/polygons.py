@@ -42,3 +42,20 @@ def rings_of(polygon: shapely.Polygon) -> Rings:
 def shape_of(rings: Sequence[Points2]) -> shapely.Polygon:
     """Return the shapely polygon of an outer ring and holes."""
     return shapely.Polygon(rings[0], list(rings[1:]))
+
+
+def sound(rings: Sequence[Sequence[Sequence[float]] | Points2], grid: float = 1e-6) -> list[Rings]:
+    """Return the valid polygons that the rings of a map describe, oriented, on a grid (m).
+
+    Repeated points, spikes, crossings and touching rings are repaired; an outline that falls
+    apart gives several polygons, one without area none.
+    """
+    loops = [np.asarray(ring, dtype=np.float64)[:, :2] for ring in rings]
+    loops = [loop for loop in loops if len(loop) >= 3]
+    if not loops:
+        return []
+    outer, *holes = [shapely.make_valid(shapely.Polygon(loop)) for loop in loops]
+    shape = shapely.difference(outer, shapely.union_all(holes)) if holes else outer
+    shape = shapely.set_precision(shape, grid)
+    parts = [part for part in shapely.get_parts(shape) if isinstance(part, shapely.Polygon)]
+    return [rings_of(part) for part in parts if part.area > 0]

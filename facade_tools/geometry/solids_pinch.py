@@ -83,7 +83,8 @@ def _opened(
     renamed: dict[tuple[int, Corner], int] = {}
     for (vertex, fan), faces in fans.items():
         if copies[vertex] > 1:
-            inwards = -sum(normals[f] for f in faces if solid.labels[f].semantic == "wall")
+            walls = [normals[f] for f in faces if solid.labels[f].semantic == "wall"]
+            inwards = -np.sum(walls, axis=0)
             renamed[vertex, fan] = len(vertices)
             vertices.append(tuple((solid.vertices[vertex] + NUDGE * _unit(inwards)).tolist()))
     faces_ = tuple(

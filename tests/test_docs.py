@@ -1,0 +1,54 @@
+"""Documentation that cannot drift."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+from pathlib import Path
+
+import pytest
+
+from facade_tools.cli._group import STAGES
+
+ROOT = Path(__file__).resolve().parent.parent
+DOCS = ROOT / "docs"
+PAGES = [*sorted(DOCS.rglob("*.md")), ROOT / "README.md", ROOT / "DESIGN.md"]
+
+
+def test_the_references_are_what_commands_and_schemas_say():
+    spec = importlib.util.spec_from_file_location("make_reference", DOCS / "make_reference.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    for page, write in module.PAGES.items():
+        assert (DOCS / page).read_text(encoding="utf-8") == write(), f"{page} is stale: `make docs`"
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_every_stage_has_an_example_and_a_page(stage, facade):
+    help_text = facade(stage, "--help").stdout.decode()
+    assert f"facade {stage}" in help_text.split("Options:")[0].split("\n", 1)[1]
+    mentioned = [page for page in DOCS.glob("*.md") if f"facade {stage}" in page.read_text()]
+    assert [page for page in mentioned if page.name != "cli-reference.md"], "no page tells of it"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_and_pictures_exist(page):
+    for target in re.findall(r"\]\(([^)#\s]+)", page.read_text(encoding="utf-8")):
+        if "://" not in target and not target.startswith("mailto:"):
+            assert (page.parent / target).exists(), target
+
+
+def test_no_tracked_page_names_a_machine():
+    for page in PAGES:
+        assert not re.search(r"(^|[^\w.])/(work|root|home)/", page.read_text(encoding="utf-8")), (
+            page
+        )
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_commands_in_the_docs_are_commands(page):
+    for block in re.findall(r"```(?:sh|bash|console)\n(.*?)```", page.read_text(), re.S):
+        for stage in re.findall(r"(?:^|[|&;]\s*|\$ )facade (?:-\S+ )*([a-z][a-z-]*)", block, re.M):
+            assert stage in STAGES, f"{page.name}: facade {stage}"

@@ -12,7 +12,7 @@ import click
 from facade_tools.artifacts.store import RawItem
 from facade_tools.artifacts.writing import write_bytes
 from facade_tools.errors import FacadeError, InvalidInput, OutputFailed
-from facade_tools.formats.models import ENDINGS, model_files, placed
+from facade_tools.formats.exporting import ENDINGS, model_files, placed
 
 from ._items import each, load
 from ._options import StreamOptions
@@ -116,7 +116,8 @@ def _parts(stream: StreamOptions, form: str, arrange: str) -> list[Any]:
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
         raise InvalidInput(f"id {twice!r} stands twice; expected unique ids in one file")
-    return placed(parts, arrange)
+    arranged: list[Any] = placed(parts, arrange)
+    return arranged
 
 
 def _write(folder: Path, files: dict[str, bytes]) -> None:

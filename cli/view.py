@@ -17,35 +17,26 @@ DRAWINGS = {
 }
 
 
-class Size(click.ParamType):
-    """Width x height in pixels."""
-
-    name = "WxH"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[int, int]:
-        """Return (width, height)."""
-        if isinstance(value, tuple):
-            return value
-        match = re.fullmatch(r"(\d{2,4})x(\d{2,4})", str(value))
-        if match is None:
-            self.fail(f"{value!r} is not WxH in pixels, like 640x480", param, ctx)
-        return int(match[1]), int(match[2])
+def _size(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[int, int] | None:
+    """Read WxH in pixels."""
+    match = re.fullmatch(r"(\d{2,4})x(\d{2,4})", value or "")
+    if value is not None and match is None:
+        raise click.BadParameter(f"{value!r} is not WxH in pixels, like 640x480", ctx, param)
+    return None if match is None else (int(match[1]), int(match[2]))
 
 
 @click.command()
 @stream_options("ARTIFACT...", seeded=False)
 @click.option(
-    "--azimuth", type=float, default=-32.0, show_default=True,
+    "--azimuth", type=float, default=-30.0, show_default=True,
     help="Where the viewer stands, degrees: 0 in front, 90 at the right side.",
 )  # fmt: skip
 @click.option(
-    "--elevation", type=click.FloatRange(-10, 89), default=12.0, show_default=True,
+    "--elevation", type=click.FloatRange(-10, 89), default=6.0, show_default=True,
     help="How high the viewer stands, degrees above the horizon.",
 )  # fmt: skip
 @click.option(
-    "--size", type=Size(),
+    "--size", metavar="WxH", callback=_size,
     help="Pixels of one picture.  [default: 960x720; 400x300 when there are several]",
 )  # fmt: skip
 @click.option("--columns", type=click.IntRange(1, 100), help="Pictures side by side in a sheet.")

@@ -18,7 +18,6 @@ from ..geometry.solids import Solid, building_solid, footprint_solid
 from .cityjson import CityModel
 
 SEMANTIC = {"ground": "GroundSurface", "wall": "WallSurface", "roof": "RoofSurface"}
-ROOF_CODES = {"flat": "1000", "shed": "1010", "gable": "1030", "hip": "1040", "mansard": "1060"}
 
 
 class _Table:
@@ -48,7 +47,7 @@ def building_model(building: Building) -> CityModel:
     open_solid, openings = pierced(solid, openings_of(building))
     geometry = [_lod2(solid, table), _lod3(open_solid, openings, table)]
     installations = _installations(building_scene(building), building.id, table)
-    attributes = {
+    attributes: dict[str, Any] = {
         "measuredHeight": round(float(solid.vertices[:, 2].max()), 3),
         "storeyHeight": float(building.storey_height),
     }
@@ -80,7 +79,7 @@ def _lod2(solid: Solid, table: _Table) -> dict[str, Any]:
 
 
 def _lod3(solid: Solid, openings: Sequence[Opening | None], table: _Table) -> dict[str, Any]:
-    """openings: the opening that a face closes, or None, one a face; a wall face comes before."""
+    """Return the LoD3 shape; openings: what each face closes, after the wall that holds it."""
     surfaces: list[dict[str, Any]] = []
     number: dict[object, int] = {}
     values = []

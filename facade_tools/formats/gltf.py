@@ -10,9 +10,9 @@ from itertools import groupby
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import __version__
-from ..geometry.arrays import Floats
 from ..geometry.mesh import Material, Mesh, Scene
 
 FLOAT, USHORT, UINT = 5126, 5123, 5125
@@ -89,7 +89,7 @@ class _Build:
         material = self._material(scene.materials[mesh.material])
         return {"attributes": attributes, "indices": accessor, "material": material}
 
-    def _vertices(self, view: str, rows: Floats, bounded: bool = False) -> int:
+    def _vertices(self, view: str, rows: NDArray[np.float32], bounded: bool = False) -> int:
         shape: dict[str, Any] = {"componentType": FLOAT, "count": len(rows)}
         shape["type"] = "VEC3" if rows.shape[1] == 3 else "VEC2"
         if bounded:

@@ -23,10 +23,11 @@ def read_scene(path: Path) -> Scene:
     import trimesh
 
     try:
-        loaded = trimesh.load(path, force="scene", process=False)
+        loaded: Any = trimesh.load(path, force="scene", process=False)
     except (OSError, ValueError, KeyError, IndexError, TypeError, NotImplementedError) as error:
         raise InvalidInput(f"not a readable mesh: {error}").at(str(path)) from None
-    meshes, materials = [], {}
+    meshes: list[Mesh] = []
+    materials: dict[str, Material] = {}
     for node in loaded.graph.nodes_geometry:
         transform, key = loaded.graph[node]
         geometry = loaded.geometry[key]

@@ -58,13 +58,13 @@ def _named(material: Material, names: dict[Material, str]) -> str:
 
 
 def _mesh_lines(mesh: Mesh, offsets: np.ndarray[tuple[int], np.dtype[np.int64]]) -> Iterator[str]:
-    yield from ("v %.6f %.6f %.6f" % (x, y, z) for x, y, z in (mesh.vertices + 0.0).tolist())
+    yield from (f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in (mesh.vertices + 0.0).tolist())
     faces = (mesh.faces + offsets[0]).tolist()
     offsets[0] += len(mesh.vertices)
     if mesh.uv is None:
-        yield from ("f %d %d %d" % (a, b, c) for a, b, c in faces)
+        yield from (f"f {a} {b} {c}" for a, b, c in faces)
         return
-    yield from ("vt %.6f %.6f" % (u, v) for u, v in mesh.uv.tolist())
+    yield from (f"vt {u:.6f} {v:.6f}" for u, v in mesh.uv.tolist())
     pairs = zip(faces, (mesh.faces + offsets[1]).tolist(), strict=True)
     offsets[1] += len(mesh.uv)
     yield from ("f " + " ".join(f"{p}/{t}" for p, t in zip(f, g, strict=True)) for f, g in pairs)

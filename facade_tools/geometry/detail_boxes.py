@@ -38,7 +38,10 @@ _U: dict[Side, tuple[int, int]] = {
 
 @dataclass(frozen=True, slots=True)
 class LocalFrame:
-    """Right-handed frame: `axes` rows are u (right), v (up), w (out of the wall); origin, metres."""
+    """Right-handed frame: rows of `axes` are u (right), v (up), w (out of the wall).
+
+    origin: world coordinates, metres.
+    """
 
     origin: Floats
     axes: Floats

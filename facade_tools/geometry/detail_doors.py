@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 from ..artifacts.building import Element
 from .detail_boxes import Box6, Parts, ring
 from .detail_windows import casing, sash_leaf
@@ -41,7 +43,7 @@ def _panelled(u0: float, v0: float, u1: float, v1: float) -> Parts:
     door: list[Box6] = []
     metal: list[Box6] = []
     glass: list[Box6] = []
-    for i, (a, b) in enumerate(zip(edges, edges[1:], strict=False)):
+    for i, (a, b) in enumerate(pairwise(edges)):
         door.append((a + 0.004, v0 + 0.03, 0.0, b - 0.004, v1, LEAF))
         light = v0 + 0.74 * (v1 - v0)
         door += _panels(a + 0.11, v0 + 0.18, b - 0.11, light - 0.06)

@@ -37,6 +37,7 @@ class Border:
 
     @property
     def normal(self) -> Floats:
+        """Unit vector out of the face."""
         return np.array([self.direction[1], -self.direction[0]])
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -59,14 +60,15 @@ def bay_window(name: str, element: Element, frame: LocalFrame, ground: float) ->
         Mesh(name, upright.world(points), faces[:, ::-1], material)
         for (points, faces), material in ((body, "wall"), (plate, "trim"), (roof, "roof"))
     ]
-    for a, b in zip(outline, outline[1:], strict=False):
+    for a, b in pairwise(outline):
         meshes += _facet(name, a, b, (v0, v1), frame)
     return meshes
 
 
 def _spread(outline: Points2, by: float) -> Points2:
     """Return the bay's outline carried out by `by` at the front and the sides."""
-    return outline + np.array([(-by, 0.0), (-by / 2, by), (by / 2, by), (by, 0.0)])
+    steps = np.array([(-by, 0.0), (-by / 2, by), (by / 2, by), (by, 0.0)])
+    return np.asarray(outline + steps)
 
 
 def _facet(

@@ -6,6 +6,8 @@ back between the casing's reveals.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 from ..artifacts.building import Element
 from .detail_boxes import Box6, Parts, ring
 
@@ -104,10 +106,7 @@ def _casement(u0: float, v0: float, u1: float, v1: float) -> Built:
     leaves = 2 if u1 - u0 > 0.7 else 1
     edges = [u0 + (u1 - u0) * i / leaves for i in range(leaves + 1)]
     return _joined(
-        *(
-            sash_leaf(a, v0, b, v1, depth=PANE + 0.01, grid=(1, rows))
-            for a, b in zip(edges, edges[1:], strict=False)
-        )
+        *(sash_leaf(a, v0, b, v1, depth=PANE + 0.01, grid=(1, rows)) for a, b in pairwise(edges))
     )
 
 

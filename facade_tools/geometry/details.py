@@ -1,4 +1,4 @@
-"""From a building or a footprint to a scene: closed mass, roof slabs, openings, porches, chimneys."""
+"""From a building or a footprint to a scene: closed mass, roof slabs, openings, porches."""
 
 from __future__ import annotations
 

@@ -18,10 +18,10 @@ class View:
     horizon. size: (width, height) of the picture in pixels.
     """
 
-    azimuth: float = -32.0
-    elevation: float = 14.0
+    azimuth: float = -30.0
+    elevation: float = 6.0
     size: tuple[int, int] = (960, 720)
-    field: float = 28.0  # vertical angle of view, degrees
+    field: float = 25.0  # vertical angle of view, degrees
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ..geometry.arrays import Floats, Integers
 from ..geometry.mesh import Material, Scene
 
-PATTERNS = ("", "siding", "shingle", "brick", "grass", "stone")
+PATTERNS = ("", "siding", "shingle", "brick", "stone")
 GLOSSY = 0.35  # materials smoother than this mirror the sky
 
 
-@dataclass(frozen=True, slots=True)
-class Soup:
-    """Triangles (m, 3, 3) in metres with unit normals (m, 3) and a row of `looks` each.
+class Soup(NamedTuple):
+    """Triangles (m, 3, 3) in metres with unit normals (m, 3), a look and a part each.
 
-    colors: linear RGB a look (k, 3). patterns: index into PATTERNS (k,). gloss: 1 mirrors the
-    sky, 0 does not (k,). textures: pictures in linear RGB (h, w, 3) or None a look. uv (m, 3, 2).
-    parts: number of the part a triangle belongs to (m,).
+    looks, parts (m,): row of the tables below, number of the named part. uv (m, 3, 2). Of a look:
+    colors (k, 3) linear light; patterns (k,) index into PATTERNS; gloss (k,) 1 mirrors the sky;
+    pictures (k, 3) first row in `texels`, height and width, height 0 without a texture.
+    texels (n, 3): all textures' pixels, linear light.
     """
 
     corners: Floats
@@ -30,7 +30,8 @@ class Soup:
     colors: Floats
     patterns: Integers
     gloss: Floats
-    textures: tuple[Floats | None, ...]
+    pictures: Integers
+    texels: Floats
 
 
 def soup_of(scene: Scene) -> Soup:
@@ -45,6 +46,7 @@ def soup_of(scene: Scene) -> Soup:
     number = {name: index for index, name in enumerate(dict.fromkeys(m.name for m in meshes))}
     flat = [np.zeros((len(m.faces), 3, 2)) if m.uv is None else m.uv[m.faces] for m in meshes]
     looks = [scene.materials[name] for name in names]
+    pictures, texels = _textures(looks)
     return Soup(
         corners,
         cross / np.where(length > 0.0, length, 1.0),
@@ -54,12 +56,13 @@ def soup_of(scene: Scene) -> Soup:
         np.array([linear_rgb(look.color) for look in looks]).reshape(-1, 3),
         np.array([PATTERNS.index(look.pattern) for look in looks], dtype=np.int64),
         np.array([float(look.roughness < GLOSSY) for look in looks]),
-        tuple(_texture(look) for look in looks),
+        pictures,
+        texels,
     )
 
 
 def _stacked(rows: list[Floats], shape: tuple[int, ...]) -> Floats:
-    return np.concatenate(rows) if rows else np.zeros(shape)
+    return np.ascontiguousarray(np.concatenate(rows)) if rows else np.zeros(shape)
 
 
 def linear_rgb(color: str) -> tuple[float, float, float]:
@@ -79,48 +82,26 @@ def to_srgb(values: Floats) -> Floats:
     return np.where(v <= 0.0031308, 12.92 * v, 1.055 * v ** (1 / 2.4) - 0.055)
 
 
-def _texture(material: Material) -> Floats | None:
-    if material.texture is None:
-        return None
+def _textures(looks: list[Material]) -> tuple[Integers, Floats]:
+    """Return where each look's picture lies in the rows of all pictures' pixels, and those rows."""
+    pictures = np.zeros((len(looks), 3), dtype=np.int64)
+    rows = [np.zeros((1, 3))]
+    known: dict[bytes, tuple[int, int, int]] = {}
+    for index, look in enumerate(looks):
+        if look.texture is None:
+            continue
+        if look.texture not in known:
+            pixels = _decoded(look.texture)
+            known[look.texture] = (sum(map(len, rows)), pixels.shape[0], pixels.shape[1])
+            rows.append(pixels.reshape(-1, 3))
+        pictures[index] = known[look.texture]
+    return pictures, np.concatenate(rows)
+
+
+def _decoded(data: bytes) -> Floats:
     import cv2
 
-    picture = cv2.imdecode(np.frombuffer(material.texture, np.uint8), cv2.IMREAD_COLOR)
-    return None if picture is None else to_linear(picture[:, :, ::-1] / 255.0)
-
-
-def patterned(pattern: int, points: Floats, normals: Floats) -> Floats:
-    """Return the brightness factor (n,) of a pattern at points (n, 3) of faces with normals."""
-    name = PATTERNS[pattern]
-    if name == "siding":
-        return _rows(points[:, 2] / 0.17, 0.16, 0.22)
-    if name == "shingle":
-        return _courses(points, normals, (0.33, 0.26), 0.3)
-    if name == "brick":
-        return _courses(points, normals, (0.26, 0.085), 0.22)
-    if name == "stone":
-        return _courses(points, normals, (0.55, 0.28), 0.25)
-    return np.ones(len(points))
-
-
-def _rows(position: Floats, line: float, depth: float) -> Floats:
-    """Boards: a dark line under each, a soft gradient on it."""
-    within = position - np.floor(position)
-    return np.where(within < line, 1.0 - depth, 1.0 + 0.06 * (within - 0.5))
-
-
-def _courses(points: Floats, normals: Floats, size: tuple[float, float], depth: float) -> Floats:
-    """Staggered tiles in rows across the face, each a little lighter or darker than the next."""
-    across = np.stack([-normals[:, 1], normals[:, 0]], axis=1)
-    length = np.linalg.norm(across, axis=1, keepdims=True)
-    across = np.where(length > 1e-6, across / np.where(length > 0, length, 1.0), [[1.0, 0.0]])
-    along = np.sum(points[:, :2] * across, axis=1)
-    slope = np.maximum(np.linalg.norm(normals[:, :2], axis=1), 1e-3)
-    flat = slope < 0.05
-    up = np.where(flat, points[:, 1], points[:, 2] / np.where(flat, 1.0, slope)) / size[1]
-    row = np.floor(up)
-    column = along / size[0] + 0.5 * (row % 2)
-    cell = np.floor(column)
-    noise = np.sin(cell * 12.9898 + row * 78.233) * 43758.5453
-    tint = 1.0 + 0.16 * (noise - np.floor(noise) - 0.5)
-    joint = (up - row < 0.16) | (column - cell < 0.05)
-    return tint * np.where(joint, 1.0 - depth, 1.0)
+    picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+    if picture is None:
+        return np.ones((1, 1, 3))
+    return to_linear(np.asarray(picture[:, :, ::-1] / 255.0, dtype=np.float64))

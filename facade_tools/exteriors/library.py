@@ -13,6 +13,7 @@ from ..artifacts.attributes import Attributes
 from ..artifacts.building import SIDES, Building, Element, Piece, Side
 from ..artifacts.documents import decode, parse_json
 from ..artifacts.library import Level, Library, LibraryBuilding, Part, PartSide, Substyle
+from ..artifacts.store import read
 from ..errors import InvalidInput
 from ..geometry.arrays import Floats, Integers, Points2
 from .attributes import NAMES, attribute_matrix, attribute_vector, building_attributes
@@ -72,6 +73,15 @@ def default_library() -> ElementLibrary:
     """Return the library that ships with the package, made from the sample houses."""
     data = files(__package__).joinpath("library.json").read_bytes()
     return ElementLibrary(decode(parse_json(data), "library"))
+
+
+def read_library(path: str) -> ElementLibrary:
+    """Return the library of a prepared `library.json`, or of buildings (.json, .jsonl, folder)."""
+    items = list(read([path], "library", "building"))
+    prepared = [item for item in items if isinstance(item, Library)]
+    if prepared and len(items) > 1:
+        raise InvalidInput("holds a library and more; expected one library, or buildings").at(path)
+    return ElementLibrary(prepared[0] if prepared else build_library(items))
 
 
 def build_library(buildings: Iterable[Building], identity: str = "library") -> Library:
@@ -166,4 +176,5 @@ def kmeans(points: Points2, count: int) -> tuple[Points2, Integers]:
 
 
 def _nearest_centre(points: Points2, centres: Points2) -> Integers:
-    return np.linalg.norm(points[:, None] - centres[None], axis=2).argmin(axis=1).astype(np.int64)
+    away = np.linalg.norm(points[:, None] - centres[None], axis=2)
+    return np.asarray(away.argmin(axis=1), dtype=np.int64)

@@ -1,0 +1,169 @@
+"""The energy of facade layouts (FW16 eq. 4), with every layout sized by eq. 5 first."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..artifacts.attributes import FacadeAttributes
+from ..artifacts.building import SIDES, Facade
+from ..artifacts.building import Side as SideName
+from ..compiled import compiled
+from ..geometry.arrays import Floats, Integers
+from .facade_attributes import facade_vector, pack_facades, side_values
+from .facade_layout import (
+    CENTRE,
+    CLEAR,
+    CODE,
+    DOOR,
+    LOWER,
+    OPEN,
+    QUIET,
+    SUB,
+    TALL,
+    WIDTH,
+    Side,
+)
+from .facade_sizing import sized
+
+LEAST_TARGET = 0.1  # a difference is divided by max(target, this)
+NARROW, WIDE = 0.5, 1.5  # bounds of eq. 5, times the average size
+TASTE = 1e-3  # weight of what only looks better: far below what eq. 4 can tell apart
+
+
+def energy(reached: FacadeAttributes, wanted: FacadeAttributes) -> float:
+    """Return eq. 4: a difference is divided by max(target, 0.1); unknown numbers are left out.
+
+    >>> one = FacadeAttributes((0.2, None, None, None), (1.0,) + (None,) * 3)
+    >>> energy(one, FacadeAttributes((0.1, None, None, None), (1.0,) + (None,) * 3))
+    1.0
+    """
+    total = 0.0
+    for name in ("wwr", "sym", "align"):
+        for value, target in zip(getattr(reached, name), getattr(wanted, name), strict=True):
+            if value is not None and target is not None:
+                total += ((value - target) / max(target, LEAST_TARGET)) ** 2
+    return total
+
+
+def facade_energy(facades: Mapping[SideName, Facade], wanted: FacadeAttributes) -> float:
+    """Return eq. 4 of finished facades."""
+    packed = pack_facades(facades)
+    row = facade_vector(packed.pieces, packed.elements)
+    values = tuple(None if np.isnan(value) else float(value) for value in row)
+    return energy(FacadeAttributes(values[:4], values[4:8], values[8:]), wanted)
+
+
+def side_targets(wanted: FacadeAttributes | None) -> Floats:
+    """Return the targets (4, 3) of the sides: wwr, sym, align; NaN where there is none."""
+    if wanted is None:
+        return np.full((len(SIDES), 3), np.nan)
+    return np.array([wanted.wwr, wanted.sym, wanted.align], dtype=np.float64).T.copy()
+
+
+@compiled
+def widths(side: Side, genome: Floats, counts: Integers) -> Floats:
+    """Return the width of each substyle (k,) on a side, by eq. 5.
+
+    Each substyle has one width on the whole side, within 0.5 to 1.5 times its average and what the
+    walls allow; the total area of the side is the target ratio's. Doors keep their width.
+    """
+    k = len(side.subs)
+    number, tall = np.zeros(k), np.zeros(k)
+    low, high = NARROW * side.subs[:, WIDTH], WIDE * side.subs[:, WIDTH]
+    area = 0.0
+    wall = 0.0
+    for p in range(len(side.pieces)):
+        wall += side.pieces[p, 4] * side.pieces[p, 5]
+        for e in range(counts[p]):
+            sub = int(genome[p, e, SUB])
+            number[sub] += 1.0
+            tall[sub] += genome[p, e, TALL]
+            high[sub] = min(high[sub], genome[p, e, CLEAR])
+    for e in range(len(side.fixed)):
+        area += side.fixed[e, 3] * side.fixed[e, 4]
+    out = side.subs[:, WIDTH].copy()
+    if np.isnan(side.targets[0]):
+        return np.minimum(out, np.maximum(low, high))
+    for sub in range(k):
+        if side.subs[sub, DOOR] > 0.0:
+            area += out[sub] * tall[sub]
+            number[sub] = 0.0
+    used = np.flatnonzero(number > 0.0)
+    total = side.targets[0] * wall - area
+    top = np.maximum(low, high)
+    out[used] = sized(out[used], tall[used], number[used], low[used], top[used], total)
+    return out
+
+
+@compiled
+def build(side: Side, genome: Floats, counts: Integers, wide: Floats) -> tuple[Floats, Floats]:
+    """Return pieces (p, 8) and elements (m, 5) of a side as `side_values` takes them."""
+    pieces = side.pieces.copy()
+    elements = np.empty((len(side.fixed) + counts.sum(), 5))
+    n = 0
+    for p in range(len(pieces)):
+        first, fixed = int(side.pieces[p, 6]), int(side.pieces[p, 7])
+        pieces[p, 6], pieces[p, 7] = n, fixed + counts[p]
+        for e in range(first, first + fixed):
+            elements[n] = side.fixed[e]
+            n += 1
+        for e in range(counts[p]):
+            row = genome[p, e]
+            sub = int(row[SUB])
+            elements[n, 0] = side.subs[sub, CODE]
+            elements[n, 1] = row[CENTRE] - wide[sub] / 2
+            elements[n, 2], elements[n, 3], elements[n, 4] = row[LOWER], wide[sub], row[TALL]
+            n += 1
+    return pieces, elements
+
+
+@compiled
+def _term(value: float, target: float) -> float:
+    if np.isnan(target):
+        return 0.0
+    return ((value - target) / max(target, LEAST_TARGET)) ** 2
+
+
+@compiled
+def side_energy(side: Side, genome: Floats, counts: Integers) -> tuple[float, float]:
+    """Return eq. 4 of one side, and the same plus a little for what looks worse.
+
+    Worse look large walls left empty, sizes far from their average and a door that found no place.
+    """
+    wide = widths(side, genome, counts)
+    pieces, elements = build(side, genome, counts, wide)
+    wwr, sym, align = side_values(pieces, elements)
+    value = _term(wwr, side.targets[0]) + _term(sym, side.targets[1])
+    value += _term(align, side.targets[2])
+    worse = _taste(side, genome, counts, wide)
+    if side.door[0] >= 0 and not _has_door(side, genome, counts):
+        worse += 1e3 / TASTE
+    return value, value + TASTE * worse
+
+
+@compiled
+def _has_door(side: Side, genome: Floats, counts: Integers) -> bool:
+    p = int(side.door[0])
+    return bool(counts[p] > 0 and genome[p, 0, SUB] == side.door[3])
+
+
+@compiled
+def _taste(side: Side, genome: Floats, counts: Integers, wide: Floats) -> float:
+    wall = 0.0
+    empty = 0.0
+    stretch = 0.0
+    n = 0
+    for p in range(len(side.pieces)):
+        if side.room[p, OPEN] == 0.0:
+            continue
+        area = side.pieces[p, 4] * side.pieces[p, 5]
+        wall += area
+        if counts[p] == 0 and side.room[p, QUIET] == 0.0 and side.pieces[p, 4] > 1.6:
+            empty += area
+        for e in range(counts[p]):
+            sub = int(genome[p, e, SUB])
+            stretch += (wide[sub] / side.subs[sub, WIDTH] - 1.0) ** 2
+            n += 1
+    return (empty / wall if wall > 0.0 else 0.0) + 4.0 * (stretch / n if n else 0.0)

@@ -1,0 +1,322 @@
+"""Layouts of facade pieces: a side as the genetic search sees it, and how layouts are drawn.
+
+Everything here is compiled scalar code over the arrays of one side. The genome of a side holds for
+each piece a row of elements; the columns of an element are its substyle, the centre along the
+piece, the lower edge, the height, and the greatest width that its neighbourhood allows (m).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..compiled import compiled
+from ..geometry.arrays import Floats, Integers
+from .facade_sizing import sized
+
+MOST = 24  # generated elements a piece
+EDGE = 0.2  # wall between an element and its piece's border (m)
+GAP = 0.16  # wall between two elements (m)
+LOWEST_SILL = 0.1  # over the storey's floor or the roof below (m)
+LEAST_HEIGHT = 0.45  # of a window (m)
+SQUEEZE = 0.75  # an element is placed where it has at least this share of its usual width
+
+SUB, CENTRE, LOWER, TALL, CLEAR = range(5)  # columns of a genome's element
+FLOOR, HEAD, UPPER, OPEN, QUIET = range(5)  # columns of `room`
+CODE, WIDTH, HEIGHT, DOOR = range(4)  # columns of `subs`; then weight on ground and upper storeys
+
+
+class Side(NamedTuple):
+    """One side as the search sees it (metres).
+
+    pieces (p, 8): as in `facade_attributes`, the last two are first and count of its `fixed`.
+    room (p, 5): v of the storey's floor and of the window heads; 1 in an upper storey; 1 where
+    elements may be placed; 1 where few are expected (garages). fixed (f, 5): code, u, v, width,
+    height of what stands. blocked (b, 5): piece, u0, v0, u1, v1. stacked (m, 2): lower and upper
+    piece. subs (k, 6). door (5,): piece that takes the main door or −1, range of its centre,
+    substyle, share of draws at the middle of the range. targets (3,): wwr, sym, align, or NaN.
+    """
+
+    pieces: Floats
+    room: Floats
+    fixed: Floats
+    blocked: Floats
+    stacked: Integers
+    subs: Floats
+    door: Floats
+    targets: Floats
+
+
+@compiled
+def pick(rng: np.random.Generator, weights: Floats) -> int:
+    """Return an index drawn by weight; −1 where all weights are 0."""
+    total = weights.sum()
+    if total <= 0.0:
+        return -1
+    mark = rng.random() * total
+    for i in range(len(weights)):
+        mark -= weights[i]
+        if mark < 0.0:
+            return i
+    return len(weights) - 1
+
+
+@compiled
+def _bounds(side: Side, p: int, sub: int, u: float) -> tuple[float, float]:
+    """Return lower edge and height of an element at u: windows hang from the storey's head.
+
+    A roof below raises the sill; the head stays in line.
+    """
+    floor, head = side.room[p, FLOOR], side.room[p, HEAD]
+    width, height = side.subs[sub, WIDTH], side.subs[sub, HEIGHT]
+    if side.subs[sub, DOOR] > 0.0:
+        return floor, height
+    lower = max(head - height, floor + LOWEST_SILL, LOWEST_SILL)
+    for k in range(len(side.blocked)):
+        row = side.blocked[k]
+        if row[0] == p and row[1] < u + width / 2 and row[3] > u - width / 2:
+            low, high = row[2], row[4]
+            if low < (lower + head) / 2 and high > lower and high <= head - LEAST_HEIGHT:
+                lower = high + 0.02
+    return lower, head - lower
+
+
+@compiled
+def _free_width(side: Side, p: int, u: float, lower: float, tall: float) -> float:
+    """Return how wide an element at u may be between borders, obstacles and fixed elements."""
+    piece = side.pieces[p]
+    clear = 2.0 * min(u - EDGE, piece[4] - EDGE - u)
+    for k in range(len(side.blocked)):
+        row = side.blocked[k]
+        if row[0] == p and row[2] < lower + tall and row[4] > lower:
+            clear = min(clear, 2.0 * max(row[1] - u, u - row[3]))
+    first = int(piece[6])
+    for k in range(first, first + int(piece[7])):
+        row = side.fixed[k]
+        if row[2] < lower + tall + GAP and row[2] + row[4] > lower - GAP:
+            clear = min(clear, 2.0 * (max(row[1] - u, u - row[1] - row[3]) - GAP))
+    return float(clear)
+
+
+@compiled
+def place(side: Side, p: int, sub: int, u: float, row: Floats, count: int) -> int:
+    """Put an element at u into `row` if there is room; return the new number of elements.
+
+    Two neighbours share the wall between them in proportion to their usual widths.
+    """
+    width = side.subs[sub, WIDTH]
+    lower, tall = _bounds(side, p, sub, u)
+    if count >= MOST or tall < LEAST_HEIGHT or lower + tall > side.pieces[p, 5] - 0.1:
+        return count
+    clear = _free_width(side, p, u, lower, tall)
+    least = width if side.subs[sub, DOOR] > 0.0 else SQUEEZE * width
+    for k in range(count):
+        other = side.subs[int(row[k, SUB]), WIDTH]
+        wall = abs(u - row[k, CENTRE]) - GAP
+        mine, its = _shares(side, sub, int(row[k, SUB]), wall)
+        its_least = other if side.subs[int(row[k, SUB]), DOOR] > 0.0 else SQUEEZE * other
+        if its < its_least:
+            return count
+        clear = min(clear, mine)
+    if clear < least:
+        return count
+    for k in range(count):
+        wall = abs(u - row[k, CENTRE]) - GAP
+        row[k, CLEAR] = min(row[k, CLEAR], _shares(side, sub, int(row[k, SUB]), wall)[1])
+    row[count, SUB], row[count, CENTRE], row[count, LOWER] = sub, u, lower
+    row[count, TALL], row[count, CLEAR] = tall, clear
+    return count + 1
+
+
+@compiled
+def _shares(side: Side, sub: int, other: int, wall: float) -> tuple[float, float]:
+    """Return the widths two neighbours may have whose centres are `wall` + GAP apart."""
+    mine, its = side.subs[sub, WIDTH], side.subs[other, WIDTH]
+    if side.subs[sub, DOOR] > 0.0:
+        return mine, 2.0 * wall - mine
+    if side.subs[other, DOOR] > 0.0:
+        return 2.0 * wall - its, its
+    return 2.0 * wall * mine / (mine + its), 2.0 * wall * its / (mine + its)
+
+
+@compiled
+def spread(rng: np.random.Generator, length: float, width: float, count: int, even: bool) -> Floats:
+    """Return `count` centres along a piece: in equal slots, or with uneven gaps that fill it.
+
+    Uneven gaps are drawn, then adapted to the piece by eq. 5 with the gaps as its sizes.
+    """
+    out = np.empty(count)
+    if even or count == 0:
+        for k in range(count):
+            out[k] = length * (k + 0.5) / count
+        return out
+    usual = np.empty(count + 1)
+    least = np.empty(count + 1)
+    for k in range(count + 1):
+        usual[k] = (0.4 + 1.4 * rng.random()) * (length / count)
+        least[k] = width + GAP
+    usual[0], usual[count] = usual[0] / 2, usual[count] / 2
+    least[0] = least[count] = width / 2 + EDGE
+    ones = np.ones(count + 1)
+    gaps = sized(usual, ones, ones, least, np.maximum(least, length * ones), length)
+    at = 0.0
+    for k in range(count):
+        at += gaps[k]
+        out[k] = at
+    return out
+
+
+@compiled
+def _neighbour(rng: np.random.Generator, side: Side, p: int, counts: Integers) -> int:
+    """Return a piece directly above or below p that holds elements, or −1."""
+    chosen = -1
+    seen = 0
+    for k in range(len(side.stacked)):
+        low, high = side.stacked[k]
+        q = high if low == p else low
+        if (low == p or high == p) and counts[q] + side.pieces[q, 7] > 0:
+            seen += 1
+            if rng.random() * seen < 1.0:
+                chosen = q
+    return chosen
+
+
+@compiled
+def follow(side: Side, p: int, q: int, genome: Floats, counts: Integers) -> Floats:
+    """Return the centres of q's elements in the frame of p, those that lie in it."""
+    shift = side.pieces[q, 1] - side.pieces[p, 1]
+    first, fixed = int(side.pieces[q, 6]), int(side.pieces[q, 7])
+    out = np.empty(fixed + counts[q])
+    n = 0
+    for k in range(len(out)):
+        own = k - fixed
+        if own < 0:
+            u = side.fixed[first + k, 1] + side.fixed[first + k, 3] / 2 + shift
+        else:
+            u = genome[q, own, CENTRE] + shift
+        if EDGE + 0.2 <= u <= side.pieces[p, 4] - EDGE - 0.2:
+            out[n] = u
+            n += 1
+    return np.sort(out[:n])
+
+
+@compiled
+def _thinned(rng: np.random.Generator, centres: Floats) -> Floats:
+    """Return the centres without one of them, drawn at random."""
+    if len(centres) == 0:
+        return centres
+    gone = int(rng.random() * len(centres))
+    return np.concatenate((centres[:gone], centres[gone + 1 :]))
+
+
+@compiled
+def _mirrored(centres: Floats, length: float, apart: float) -> Floats:
+    """Return centres that mirror themselves: each is kept with its mirror image or left out."""
+    out = np.empty(2 * len(centres))
+    n = 0
+    for u in centres:
+        image = length - u
+        if abs(u - image) > 0.05 and abs(u - image) < apart:
+            continue
+        free = True
+        for k in range(n):
+            free = free and abs(out[k] - u) >= apart and abs(out[k] - image) >= apart
+        if free:
+            out[n] = u
+            n += 1
+            if abs(u - image) > 0.05:
+                out[n] = image
+                n += 1
+    return np.sort(out[:n])
+
+
+@compiled
+def _number(rng: np.random.Generator, side: Side, p: int, sub: int) -> int:
+    """Draw how many elements of a substyle a piece gets: about what the target ratio needs."""
+    length, tall = side.pieces[p, 4], side.pieces[p, 5]
+    most = int((length - 2 * EDGE + GAP) / (0.9 * side.subs[sub, WIDTH] + GAP))
+    most = min(max(most, 0), MOST)
+    if rng.random() < 0.1:
+        return int(rng.random() * (most + 1))
+    ratio = side.targets[0] if not np.isnan(side.targets[0]) else 0.15
+    if side.room[p, QUIET] > 0.0:
+        ratio *= 0.3
+    wanted = ratio * length * tall / (side.subs[sub, WIDTH] * side.subs[sub, HEIGHT])
+    return min(max(int(wanted + 1.6 * rng.random() - 0.3), 0), most)
+
+
+@compiled
+def draw_piece(
+    rng: np.random.Generator, side: Side, p: int, genome: Floats, counts: Integers
+) -> None:
+    """Draw a new layout of piece p into the genome of its side."""
+    counts[p] = 0
+    if side.room[p, OPEN] == 0.0:
+        return
+    sym = side.targets[1] if not np.isnan(side.targets[1]) else 0.8
+    even = rng.random() < 0.1 + 0.8 * sym
+    row = genome[p]
+    n = _draw_door(rng, side, p, even, row) if side.door[0] == p else 0
+    weights = side.subs[:, 5] if side.room[p, UPPER] > 0.0 else side.subs[:, 4]
+    sub = pick(rng, weights * (1.0 - side.subs[:, DOOR]))
+    if sub < 0:
+        counts[p] = n
+        return
+    align = side.targets[2] if not np.isnan(side.targets[2]) else 0.8
+    q = _neighbour(rng, side, p, counts) if rng.random() < 0.15 + 0.8 * align else -1
+    length, width = side.pieces[p, 4], side.subs[sub, WIDTH]
+    if q >= 0:
+        centres = follow(side, p, q, genome, counts)
+        if rng.random() < 0.3:
+            centres = _thinned(rng, centres)
+        if even:
+            centres = _mirrored(centres, length, width + GAP)
+    else:
+        uneven = not even and rng.random() < 0.5
+        centres = spread(rng, length, width, _number(rng, side, p, sub), not uneven)
+        if not even and not uneven:
+            centres = _thinned(rng, centres)
+    counts[p] = _fill(rng, side, p, sub, centres, row, n, even)
+
+
+@compiled
+def _fill(
+    rng: np.random.Generator,
+    side: Side,
+    p: int,
+    sub: int,
+    centres: Floats,
+    row: Floats,
+    n: int,
+    even: bool,
+) -> int:
+    """Place elements at the centres; now and then one (or a mirrored pair) of another kind."""
+    weights = side.subs[:, 5] if side.room[p, UPPER] > 0.0 else side.subs[:, 4]
+    m = len(centres)
+    other, at = sub, -1
+    if m and rng.random() < 0.3:
+        other, at = pick(rng, weights), int(rng.random() * m)
+        if side.subs[other, DOOR] > 0.0 and even:
+            at = m // 2 if m % 2 == 1 else -1
+    for k in range(m):
+        special = k == at or (even and k == m - 1 - at and side.subs[other, DOOR] == 0.0)
+        n = place(side, p, other if special and at >= 0 else sub, centres[k], row, n)
+    return n
+
+
+@compiled
+def _draw_door(rng: np.random.Generator, side: Side, p: int, even: bool, row: Floats) -> int:
+    """Place the main door within its range; return 1, or 0 where no place was found."""
+    low, high, sub = side.door[1], side.door[2], int(side.door[3])
+    middle = side.pieces[p, 4] / 2
+    at = (low + high) / 2
+    if even and low <= middle <= high:
+        at = middle
+    elif rng.random() >= side.door[4]:
+        at = low + (high - low) * rng.random()
+    for _ in range(12):
+        if place(side, p, sub, at, row, 0) == 1:
+            return 1
+        at = low + (high - low) * rng.random()
+    return 0

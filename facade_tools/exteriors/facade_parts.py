@@ -1,0 +1,208 @@
+"""What a building gets from the library: substyles with weights, doors, garage doors."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..artifacts.building import SIDES, Building, Element, ElementKind, Piece, Side
+from ..artifacts.library import Library, LibraryBuilding, Part, PartSide
+from ..geometry.arrays import Floats
+from ..geometry.blocked import blocked_rectangles, wall_of
+from ..geometry.checks import GARAGE_WALL, element_rectangles, overlaps
+
+DOOR = (0.95, 2.1)  # a door where the library has none (m)
+DOOR_WEIGHT = 3.0  # doors beside the main one are few: drawn this much more often than counted
+BESIDE_DOOR = 0.25  # least wall between the main door and its piece's border (m)
+USUAL_HEADS = (2.15, 2.1)  # where the library's building has no window (m)
+
+
+@dataclass(frozen=True, slots=True)
+class PartRow:
+    """A substyle on one level: average size (m) and how often it occurs by side and level."""
+
+    kind: ElementKind
+    style: str
+    width: float
+    height: float
+    weights: Mapping[tuple[PartSide, int], float]
+
+
+@dataclass(slots=True)
+class Codes:
+    """Numbers for pairs of kind and style."""
+
+    names: list[tuple[ElementKind, str]] = field(default_factory=list)
+
+    def number(self, kind: ElementKind, style: str) -> int:
+        """Return the number of a kind and style, a new one if it is new."""
+        if (kind, style) not in self.names:
+            self.names.append((kind, style))
+        return self.names.index((kind, style))
+
+
+@dataclass(frozen=True, slots=True)
+class MainDoor:
+    """Where the main door may be: piece, range of its centre (m), substyle, share in the middle."""
+
+    piece: int = -1
+    low: float = 0.0
+    high: float = 0.0
+    sub: int = 0
+    middle: float = 0.0
+
+
+def part_rows(library: Library, entry: LibraryBuilding) -> list[PartRow]:
+    """Return the substyles of a library building by level; the last row is the main door's."""
+    rows = []
+    windows = [p for p in entry.parts if library.substyles[p.substyle].kind != "garage-door"]
+    for index, level in sorted({(p.substyle, p.level) for p in windows}):
+        parts = [p for p in windows if (p.substyle, p.level) == (index, level)]
+        style = library.substyles[index]
+        alike = [p for p in windows if p.substyle == index]
+        factor = DOOR_WEIGHT if style.kind == "door" else 1.0
+        upper = int(level == "upper")
+        weights = {(p.side, upper): factor * p.count for p in parts}
+        width, height = _mean(alike, "width"), _mean(parts, "height")
+        rows.append(PartRow(style.kind, style.style, width, height, weights))
+    if not any(row.kind == "window" for row in rows):
+        weights = {(side, level): 1.0 for side in ("front", "back", "end") for level in (0, 1)}
+        rows.append(PartRow("window", "casement", 1.2, 1.3, weights))
+    return [*rows, _main_door(library, entry)]
+
+
+def _main_door(library: Library, entry: LibraryBuilding) -> PartRow:
+    doors = [
+        (part.side != "front", part.width, part)
+        for part in entry.parts
+        if library.substyles[part.substyle].kind == "door" and part.height >= 1.8
+    ]
+    if not doors:
+        return PartRow("door", "panel", *DOOR, {})
+    part = min(doors, key=lambda row: row[:2])[2]
+    style = library.substyles[part.substyle].style
+    return PartRow("door", style, min(part.width, 1.2), min(part.height, 2.3), {})
+
+
+def _mean(parts: Sequence[Part], name: str) -> float:
+    counts = [part.count for part in parts]
+    return float(np.average([getattr(part, name) for part in parts], weights=counts))
+
+
+def usual_heads(library: Library, entry: LibraryBuilding) -> tuple[float, float]:
+    """Return the height of most window heads over the floor, on the ground and above (m)."""
+    heads = []
+    for level, usual in zip(("ground", "upper"), USUAL_HEADS, strict=True):
+        rows = [
+            (part.count, part.head)
+            for part in entry.parts
+            if part.level == level and library.substyles[part.substyle].kind == "window"
+        ]
+        heads.append(max(rows)[1] if rows else usual)
+    return heads[0], heads[1]
+
+
+def main_doors(
+    building: Building, pieces: Sequence[Piece], free: Sequence[bool], rows: Sequence[PartRow]
+) -> list[MainDoor]:
+    """Return where the main door may be on a side, best first.
+
+    At ground level, in general boxes before garages, behind a porch before elsewhere (then
+    within the porch), in a wide wall before a narrow one.
+    """
+    sub, half = len(rows) - 1, rows[-1].width / 2 + BESIDE_DOOR
+    kinds = {box.id: box.kind for box in building.boxes}
+    found = []
+    for p, piece in enumerate(pieces):
+        tall = piece.height >= rows[-1].height + 0.1
+        if not free[p] or piece.origin[2] > 1e-6 or piece.width < 2 * half or not tall:
+            continue
+        porch = _porch_range(building, piece)
+        low, high = half, piece.width - half
+        sheltered = porch is not None and max(low, porch[0]) <= min(high, porch[1])
+        if porch is not None and sheltered:
+            low, high = max(low, porch[0]), min(high, porch[1])
+        rank = kinds[piece.box] != "general", not sheltered, -piece.width
+        found.append((rank, MainDoor(p, low, high, sub, 0.6 if sheltered else 0.3)))
+    return [door for _, door in sorted(found, key=lambda row: row[0])]
+
+
+def _porch_range(building: Building, piece: Piece) -> tuple[float, float] | None:
+    """Return where along a front piece a porch shelters the wall, half a metre in from its ends."""
+    x, y = wall_of("front", piece).start
+    for box in building.boxes:
+        touches = abs(box.y + box.depth / 2 - y) < 0.05
+        if box.kind == "porch" and touches:
+            low, high = box.x - box.width / 2 - x + 0.5, box.x + box.width / 2 - x - 0.5
+            if low <= high and high > 0 and low < piece.width:
+                return low, high
+    return None
+
+
+def garage_doors(
+    building: Building,
+    pieces: Mapping[Side, Sequence[Piece]],
+    library: Library,
+    entry: LibraryBuilding,
+) -> dict[str, tuple[Element, ...]]:
+    """Return by piece id the doors of every garage: in its front wall, or else its widest."""
+    sizes = _garage_sizes(library, entry)
+    doors: dict[str, tuple[Element, ...]] = {}
+    for box in building.boxes:
+        walls = [
+            (
+                side != "front",
+                SIDES.index(side) if side != "front" else 0,
+                -piece.width,
+                side,
+                piece,
+            )
+            for side in SIDES
+            for piece in pieces.get(side, ())
+            if box.kind == "garage" and piece.box == box.id and _takes_garage_door(piece)
+        ]
+        for *_, side, piece in sorted(walls, key=lambda row: (row[0], row[2], row[1])):
+            placed = _garage_elements(piece, sizes, blocked_rectangles(building, side, piece))
+            if placed:
+                doors[piece.id] = placed
+                break
+    return doors
+
+
+def _takes_garage_door(piece: Piece) -> bool:
+    large = piece.width >= GARAGE_WALL[0] - 0.2 and piece.height >= GARAGE_WALL[1] - 0.1
+    return large and piece.origin[2] < 1e-6 and not piece.elements
+
+
+def _garage_sizes(library: Library, entry: LibraryBuilding) -> list[tuple[str, float, float]]:
+    """Return style and size of garage doors: the building's own first, then all of the library."""
+    own = [part.substyle for part in entry.parts]
+    order = [*own, *range(len(library.substyles))]
+    styles = [library.substyles[k] for k in order if library.substyles[k].kind == "garage-door"]
+    rows = [(s.style, s.width, s.height) for s in styles]
+    return list(dict.fromkeys([*rows, ("sectional", 4.8, 2.1), ("sectional", 2.4, 2.1)]))
+
+
+def _garage_elements(
+    piece: Piece, sizes: Iterable[tuple[str, float, float]], blocked: Floats
+) -> tuple[Element, ...]:
+    """Return one wide door or several narrow ones, as wide as fits, evenly spaced."""
+    best: tuple[Element, ...] = ()
+    for style, width, height in sizes:
+        width, tall = min(width, piece.width - 0.5), min(height, piece.height - 0.15)
+        count = max(int((piece.width - 0.4) / (width + 0.3)), 1)
+        gap = (piece.width - count * width) / (count + 1)
+        row = tuple(
+            Element("garage-door", style, round(gap + k * (width + gap), 3), 0.0, width, tall)
+            for k in range(count)
+        )
+        free = not overlaps(element_rectangles(row), blocked).any()
+        if free and (not best or _glass(row) > 1.02 * _glass(best)):
+            best = row
+    return best
+
+
+def _glass(row: Iterable[Element]) -> float:
+    return sum(e.width for e in row)

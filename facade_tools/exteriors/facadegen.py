@@ -1,0 +1,178 @@
+"""Facades for a whole building: from a mass and attributes to windows and doors (FW16 6.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..artifacts.attributes import WINDOW_BITS, Attributes, FacadeAttributes
+from ..artifacts.building import SIDES, Building, Energy, Facade, Side
+from ..artifacts.library import LibraryBuilding
+from ..errors import InvalidInput
+from ..geometry.arrays import Floats
+from ..geometry.pieces import facade_pieces
+from .attributes import building_attributes
+from .facade_energy import LEAST_TARGET, energy, side_targets, widths
+from .facade_layout import OPEN
+from .facade_layout import Side as SearchSide
+from .facade_parts import Codes, MainDoor, PartRow, garage_doors, main_doors, part_rows, usual_heads
+from .facade_site import Solution, facade_of, search_side_of, storey_heads, with_door
+from .genetic import Search, search_side
+from .kept import Standing, standing_sides
+from .library import ElementLibrary, default_library
+from .palette import house_colors
+
+SIMILAR = 3  # buildings among which the one that lends its elements is drawn
+TRIES = 3  # walls in which the main door is tried where the first does not do
+GOOD = 2e-3  # energy of a side that needs no further try
+MISSED = 0.05  # relative difference from which an attribute counts as not met
+
+
+@dataclass(frozen=True, slots=True)
+class FacadeOptions:
+    """How facades are made.
+
+    library: where elements come from; None: the shipped one. keep: a partial building whose listed
+    sides were observed. candidates: how many different buildings to make of each.
+    """
+
+    library: ElementLibrary | None = None
+    keep: Building | None = None
+    candidates: int = 1
+    search: Search = field(default_factory=Search)
+
+
+def generate_facades(
+    building: Building,
+    options: FacadeOptions = FacadeOptions(),
+    *,
+    rng: np.random.Generator,
+) -> Iterator[Building]:
+    """Yield a building with windows and doors on all sides, `options.candidates` times.
+
+    Targets come from `building.targets`; where it has none, from the most similar building of
+    the library. Elements of `options.keep` stay to the millimetre and nothing is added to the
+    sides that it lists. Several candidates get `-1`, `-2`, … after the building's id. Raises
+    InvalidInput on a partial building, Infeasible where a kept element has no wall.
+    """
+    _refuse_unfinished(building)
+    shelf = options.library or default_library()
+    for number, own in enumerate(rng.spawn(options.candidates), start=1):
+        identity = building.id if options.candidates == 1 else f"{building.id}-{number}"
+        entry = shelf.nearest(_known(building), SIMILAR, own)
+        wanted = _wanted(building, entry)
+        facades = _Facades(building, shelf, entry, options, own).all(wanted)
+        colors = building.colors or house_colors([entry], rng=own)
+        done = replace(building, id=identity, facades=facades, colors=colors)
+        yield replace(done, energy=_energy(done, wanted))
+
+
+def _refuse_unfinished(building: Building) -> None:
+    if building.partial or any(box.height is None for box in building.boxes):
+        message = "a partial building has no mass for facades; run facade massgen --keep first"
+        raise InvalidInput(message, pointer="/partial")
+    if all(box.kind == "porch" for box in building.boxes):
+        raise InvalidInput("no general or garage box; expected at least one", pointer="/boxes")
+
+
+def _known(building: Building) -> Attributes:
+    """Return what is known for choosing the library's building: targets, else the mass."""
+    bare = building_attributes(replace(building, facades={}))
+    if building.targets is not None:
+        return replace(bare, element=building.targets.element)
+    unseen = dict.fromkeys(WINDOW_BITS)
+    return replace(bare, element=replace(bare.element, window=unseen))
+
+
+def _wanted(building: Building, entry: LibraryBuilding) -> FacadeAttributes:
+    return entry.attributes.facade if building.targets is None else building.targets.facade
+
+
+@dataclass(frozen=True, slots=True)
+class _Facades:
+    """One candidate in the making: the building, its elements' source, its random numbers."""
+
+    building: Building
+    shelf: ElementLibrary
+    entry: LibraryBuilding
+    options: FacadeOptions
+    rng: np.random.Generator
+
+    def all(self, wanted: FacadeAttributes) -> dict[Side, Facade]:
+        """Return the facades of all four sides."""
+        library = self.shelf.library
+        rows, codes = part_rows(library, self.entry), Codes()
+        sides = self._standing()
+        heads = storey_heads(self.building, sides, usual_heads(library, self.entry))
+        facades: dict[Side, Facade] = {}
+        for standing, targets in zip(sides, side_targets(wanted), strict=True):
+            plain = search_side_of(self.building, standing, rows, codes, heads)
+            doors = self._main_doors(sides, standing, plain, rows)
+            found, main = self._best(plain, doors, targets)
+            facades[standing.name] = facade_of(standing, plain, found, codes, main)
+        return facades
+
+    def _standing(self) -> list[Standing]:
+        """Return the sides with known elements and garage doors."""
+        keep, library = self.options.keep, self.shelf.library
+        sides = standing_sides(self.building, facade_pieces(self.building), keep)
+        free = {side.name: side.pieces for side in sides if not side.closed}
+        doors = garage_doors(self.building, free, library, self.entry)
+        return [
+            replace(
+                side,
+                pieces=tuple(
+                    replace(piece, elements=doors.get(piece.id, piece.elements))
+                    for piece in side.pieces
+                ),
+                closed=side.closed | (doors.keys() & {piece.id for piece in side.pieces}),
+            )
+            for side in sides
+        ]
+
+    def _main_doors(
+        self,
+        sides: Sequence[Standing],
+        standing: Standing,
+        plain: SearchSide,
+        rows: Sequence[PartRow],
+    ) -> list[MainDoor]:
+        given = any(e.main for side in sides for piece in side.pieces for e in piece.elements)
+        if given or standing.name != "front":
+            return []
+        free = [bool(value) for value in plain.room[:, OPEN]]
+        return main_doors(self.building, standing.pieces, free, rows)[:TRIES]
+
+    def _best(
+        self, plain: SearchSide, doors: Sequence[MainDoor], targets: Floats
+    ) -> tuple[Solution, int]:
+        """Return the best layout of a side over the walls that may take the main door."""
+        best, main = None, -1
+        for door in doors or [MainDoor()]:
+            side = with_door(plain, door, targets)
+            genome, counts, value = search_side(side, self.options.search, rng=self.rng)
+            if best is None or value < best.energy:
+                best = Solution(genome, counts, widths(side, genome, counts), value)
+                main = door.piece
+            if value <= GOOD:
+                break
+        assert best is not None
+        return best, main
+
+
+def _energy(done: Building, wanted: FacadeAttributes) -> Energy:
+    """Return the energy with what was not met, named `wwr.front` and so on."""
+    reached = building_attributes(done).facade
+    residuals = {}
+    for name in ("wwr", "sym", "align"):
+        pairs = zip(SIDES, getattr(reached, name), getattr(wanted, name), strict=True)
+        for side, value, target in pairs:
+            if value is not None and target is not None:
+                off = abs(value - target) / max(target, LEAST_TARGET)
+                if off > MISSED:
+                    residuals[f"{name}.{side}"] = off
+    before = done.energy or Energy()
+    merged = {**before.residuals, **residuals}
+    return replace(before, facade=energy(reached, wanted), residuals=merged)

@@ -28,7 +28,14 @@ def _print_version(ctx: click.Context, _: click.Parameter, value: bool) -> None:
 @click.option("-v", "--verbose", count=True, help="Say more on standard error; twice: everything.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress and no warnings.")
 @click.option("--debug", is_flag=True, help="Show the traceback of an error.")
-@click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=_print_version)
+@click.option(
+    "--version",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_print_version,
+    help="Show the version and exit.",
+)
 def facade(verbose: int, quiet: bool, debug: bool) -> None:
     """Learn, generate, parse and restyle building exteriors.
 
@@ -46,11 +53,11 @@ def facade(verbose: int, quiet: bool, debug: bool) -> None:
 
 def main(arguments: Sequence[str]) -> int:
     """Run the command line and return its exit code."""
-    from ._report import explain
-
     try:
         result = facade.main(list(arguments), prog_name="facade", standalone_mode=False)
     except (Exception, KeyboardInterrupt) as error:
+        from ._report import explain
+
         return explain(error, arguments)
     return result if isinstance(result, int) else 0
 

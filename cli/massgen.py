@@ -1,0 +1,47 @@
+"""`facade massgen`: attributes to mass models with roofs."""
+
+from __future__ import annotations
+
+import click
+
+from ._options import StreamOptions, stream_options
+from ._stream import ItemStage, run_stream, side_input
+
+
+@click.command()
+@stream_options("ATTRIBUTES...")
+@click.option("--keep", metavar="PARTIAL", help="Building whose boxes stay exactly as they are.")
+@click.option(
+    "--candidates",
+    type=click.IntRange(1, 100),
+    default=1,
+    show_default=True,
+    help="How many different masses an item, in order of energy.",
+)
+@click.option(
+    "--require",
+    type=click.FloatRange(0),
+    metavar="E",
+    help="Exit 4 where the mass energy stays above E; default: only report it.",
+)
+def command(
+    stream: StreamOptions, keep: str | None, candidates: int, require: float | None
+) -> None:
+    """Make mass models with roofs from attributes (FW16 6.1).
+
+    ATTRIBUTES are .json or .jsonl files, folders of them, or - for standard input. Known boxes
+    of a partial building stay; the rest is generated around them.
+
+    \b
+    Example: facade sample model.json -n 5 | facade massgen - -o masses.jsonl
+    """
+    from facade_tools.artifacts.store import read_one
+    from facade_tools.exteriors.massgen import generate_mass
+
+    known = None if keep is None else read_one(keep, "building")
+    recorded = {"candidates": candidates, "require": require}
+    options = {"keep": known, "candidates": candidates, "require": require}
+    stage = ItemStage(
+        "massgen", ("attributes",), generate_mass, options, recorded, side_input(keep)
+    )
+    run_stream(stage, stream)

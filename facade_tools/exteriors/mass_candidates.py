@@ -1,0 +1,55 @@
+"""Choosing candidates that differ."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..artifacts.building import Box
+from ..geometry.arrays import Rectangles
+from ..geometry.boxes import area_perimeter, box_rectangles
+
+if TYPE_CHECKING:
+    from .massgen import Mass
+
+LEAST_DISTANCE = 0.05
+RELAXED = (LEAST_DISTANCE, 0.02, 0.005, 1e-4)
+
+
+def mass_distance(a: Sequence[Box], b: Sequence[Box]) -> float:
+    """Return 1 − |A ∩ B| / |A ∪ B| of two masses as solids without roofs, porches included.
+
+    Both are taken where they stand; 0: equal, 1: apart.
+    """
+    levels = sorted({0.0, *(box.height or 0.0 for box in (*a, *b))})
+    common = whole = 0.0
+    for low, high in pairwise(levels):
+        first, second = (_above(boxes, low) for boxes in (a, b))
+        union = area_perimeter(np.vstack([first, second]))[0]
+        both = area_perimeter(first)[0] + area_perimeter(second)[0] - union
+        common += (high - low) * both
+        whole += (high - low) * union
+    return 1.0 - common / whole if whole else 0.0
+
+
+def _above(boxes: Sequence[Box], level: float) -> Rectangles:
+    return box_rectangles([box for box in boxes if (box.height or 0.0) > level])
+
+
+def diverse(masses: Sequence[Mass], count: int) -> list[Mass]:
+    """Return `count` masses, best first, at least LEAST_DISTANCE apart where that many are.
+
+    Where fewer are so different the distance is lowered step by step (RELAXED); fewer than
+    `count` come back only where there are no more different ones at all.
+    """
+    chosen: list[Mass] = list(masses[:1])
+    for least in RELAXED:
+        for mass in masses:
+            if len(chosen) >= count:
+                break
+            if all(mass_distance(mass.boxes, other.boxes) >= least for other in chosen):
+                chosen.append(mass)
+    return sorted(chosen[:count], key=lambda mass: mass.energy) if count > 1 else chosen[:1]

@@ -1,0 +1,221 @@
+"""Polishing of a layout: Levenberg-Marquardt on the positions of its lines and its heights.
+
+Edges that lie on one line move together, so that what was flush stays flush; lines of locked
+boxes do not move. Scalar code throughout: the result does not depend on a linear algebra library.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..compiled import compiled
+from ..geometry.arrays import Floats, Integers
+from .mass_attributes import MASS_SIZE, PORCH
+from .mass_energy import DISCONNECTED, Target
+from .mass_layout import (
+    CAPACITY,
+    EMPTY,
+    HEIGHT_LOCKED,
+    LEAST_THICKNESS,
+    PLAN_LOCKED,
+    Layout,
+    Work,
+    attributes_of_layout,
+    connected,
+    thinness,
+)
+
+STEP = 1e-5  # of the forward differences (m)
+LONGEST_MOVE = 1.0  # of a line in one step (m)
+ROUNDS = 25
+SOLVED = 1e-18
+LEAST_HEIGHT = 1.8  # of a porch (m)
+MOST_VARIABLES = 5 * CAPACITY
+
+
+class Variables(NamedTuple):
+    """Which variable each number of a layout follows (-1: fixed), and the variables' values."""
+
+    of: Integers  # (CAPACITY, 5)
+    values: Floats
+
+
+@compiled
+def _variable(values: Floats, axes: Integers, count: int, axis: int, value: float) -> int:
+    for v in range(count):
+        if axes[v] == axis and values[v] == value:
+            return v
+    return count
+
+
+@compiled
+def _is_locked(layout: Layout, k: int, column: int) -> bool:
+    return bool((layout.locks[k] & (HEIGHT_LOCKED if column == 4 else PLAN_LOCKED)) != 0)
+
+
+@compiled
+def gather(layout: Layout) -> Variables:
+    """Return the distinct free lines and heights of a layout as variables."""
+    of = np.full((CAPACITY, 5), -1, dtype=np.int64)
+    values = np.zeros(MOST_VARIABLES)
+    axes = np.zeros(MOST_VARIABLES, dtype=np.int64)
+    fixed = np.zeros(MOST_VARIABLES, dtype=np.bool_)
+    count = 0
+    for k in range(CAPACITY):
+        if layout.kinds[k] == EMPTY:
+            continue
+        for column in range(5):
+            # Heights of porches are their own; the plan has x lines and y lines.
+            axis = column % 2 if column < 4 else 2 + (layout.kinds[k] == PORCH) * (k + 1)
+            v = _variable(values, axes, count, axis, layout.rows[k, column])
+            if v == count:
+                values[v], axes[v] = layout.rows[k, column], axis
+                count += 1
+            fixed[v] = fixed[v] or _is_locked(layout, k, column)
+            of[k, column] = v
+    names = np.full(MOST_VARIABLES, -1, dtype=np.int64)
+    free = 0
+    for v in range(count):
+        if not fixed[v]:
+            names[v] = free
+            values[free] = values[v]
+            free += 1
+    for k in range(CAPACITY):
+        for column in range(5):
+            if of[k, column] >= 0:
+                of[k, column] = names[of[k, column]]
+    return Variables(of, values[:free].copy())
+
+
+@compiled
+def scatter(variables: Variables, values: Floats, layout: Layout) -> None:
+    """Write the variables' `values` into a layout."""
+    for k in range(CAPACITY):
+        for column in range(5):
+            v = variables.of[k, column]
+            if v >= 0:
+                layout.rows[k, column] = values[v]
+
+
+@compiled
+def valid(layout: Layout, storey_height: float) -> bool:
+    """Tell whether all boxes are thick and high enough."""
+    for k in range(CAPACITY):
+        if layout.kinds[k] == EMPTY:
+            continue
+        x0, y0, x1, y1, height = layout.rows[k]
+        low = LEAST_HEIGHT if layout.kinds[k] == PORCH else 0.5 * storey_height + 0.01
+        free_plan = layout.locks[k] & PLAN_LOCKED == 0
+        if free_plan and min(x1 - x0, y1 - y0) < LEAST_THICKNESS:
+            return False
+        if height < low and layout.locks[k] & HEIGHT_LOCKED == 0:
+            return False
+    return True
+
+
+@compiled
+def _residuals(layout: Layout, target: Target, work: Work, out: Floats) -> float:
+    """Write the weighted differences and the root of E_thick; return their sum of squares."""
+    thick = 0.0
+    if attributes_of_layout(layout, target.storey_height, work):
+        thick = thinness(work, LEAST_THICKNESS)
+    total = 0.0 if connected(layout) else DISCONNECTED
+    for i in range(MASS_SIZE):
+        out[i] = np.sqrt(target.weights[i]) * (work.values[i] - target.values[i])
+        total += out[i] * out[i]
+    out[MASS_SIZE] = np.sqrt(thick)
+    return total + thick
+
+
+@compiled
+def _solve(a: Floats, b: Floats, damping: float) -> Floats:
+    """Solve (A + damping · I) x = b for symmetric positive A by Cholesky's method."""
+    n = len(b)
+    low = np.zeros((n, n))
+    x = b.copy()
+    for i in range(n):
+        for j in range(i + 1):
+            s = a[i, j] + (damping if i == j else 0.0)
+            for k in range(j):
+                s -= low[i, k] * low[j, k]
+            low[i, j] = np.sqrt(max(s, 1e-30)) if i == j else s / low[j, j]
+    for i in range(n):
+        for k in range(i):
+            x[i] -= low[i, k] * x[k]
+        x[i] /= low[i, i]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            x[i] -= low[k, i] * x[k]
+        x[i] /= low[i, i]
+    return x
+
+
+@compiled
+def _normal_equations(
+    layout: Layout, target: Target, variables: Variables, work: Work, base: Floats
+) -> tuple[Floats, Floats]:
+    """Return JᵀJ and Jᵀr by forward differences; `layout` is put back."""
+    n = len(variables.values)
+    jacobian = np.zeros((n, MASS_SIZE + 1))
+    moved = np.zeros(MASS_SIZE + 1)
+    values = variables.values.copy()
+    for v in range(n):
+        values[v] += STEP
+        scatter(variables, values, layout)
+        _residuals(layout, target, work, moved)
+        values[v] = variables.values[v]
+        for i in range(MASS_SIZE + 1):
+            jacobian[v, i] = (moved[i] - base[i]) / STEP
+    scatter(variables, values, layout)
+    square, right = np.zeros((n, n)), np.zeros(n)
+    for v in range(n):
+        for i in range(MASS_SIZE + 1):
+            right[v] += jacobian[v, i] * base[i]
+        for u in range(v + 1):
+            for i in range(MASS_SIZE + 1):
+                square[v, u] += jacobian[v, i] * jacobian[u, i]
+            square[u, v] = square[v, u]
+    return square, right
+
+
+@compiled
+def polish(layout: Layout, target: Target, work: Work) -> float:
+    """Move lines and heights to a local minimum of the energy; return it.
+
+    Never raises the energy, never makes a box thinner than 0.5 m.
+    """
+    variables = gather(layout)
+    base, trial = np.zeros(MASS_SIZE + 1), np.zeros(MASS_SIZE + 1)
+    energy = _residuals(layout, target, work, base)
+    damping = 1e-4
+    for _ in range(ROUNDS):
+        if energy < SOLVED or len(variables.values) == 0:
+            break
+        square, right = _normal_equations(layout, target, variables, work, base)
+        before = energy
+        for _ in range(8):
+            step = _solve(square, right, damping)
+            longest = max(np.abs(step).max(), LONGEST_MOVE)
+            values = variables.values - step * (LONGEST_MOVE / longest)
+            scatter(variables, values, layout)
+            energy = _residuals(layout, target, work, trial)
+            if energy < before and valid(layout, target.storey_height):
+                damping = max(damping * 0.1, 1e-12)
+                variables.values[:] = values
+                base[:] = trial
+                break
+            energy = before
+            damping *= 10.0
+        scatter(variables, variables.values, layout)
+        if energy > before * 0.999:
+            break
+    return energy
+
+
+@compiled
+def round_layout(layout: Layout, digits_step: float) -> None:
+    """Round free lines and heights to multiples of `digits_step` (m), flush edges together."""
+    variables = gather(layout)
+    scatter(variables, np.rint(variables.values / digits_step) * digits_step, layout)

@@ -1,0 +1,110 @@
+"""The search for layouts: informed starts, polishing, annealing where they do not suffice."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..compiled import compiled
+from ..geometry.arrays import Floats, Integers
+from .mass_energy import Target, layout_energy
+from .mass_layout import CAPACITY, Layout, Work
+from .mass_polish import polish, valid
+from .mass_starts import box_count, draw_start, drop_redundant
+from .mass_taste import clumsiness
+
+STARTS = 1500  # drawn a round
+POLISHED = 16  # of them polished
+BOX_PRICE = 0.003  # of energy: prefers the simpler of equal starts
+EXACT = 1e-8  # energies below it are equally good
+
+
+class Pool(NamedTuple):
+    """The best layouts so far: boxes (n, CAPACITY, 5), kinds, locks, energies, clumsiness."""
+
+    rows: Floats
+    kinds: Integers
+    locks: Integers
+    energies: Floats
+    taste: Floats
+
+
+def new_pool(size: int) -> Pool:
+    """Return a pool without layouts (their energies are infinite)."""
+    shape = (size, CAPACITY)
+    return Pool(
+        np.zeros((*shape, 5)),
+        np.full(shape, -1, dtype=np.int64),
+        np.zeros(shape, dtype=np.int64),
+        np.full(size, np.inf),
+        np.full(size, np.inf),
+    )
+
+
+@compiled
+def pooled(pool: Pool, k: int) -> Layout:
+    """Return layout k of a pool (shared, not copied)."""
+    return Layout(pool.rows[k], pool.kinds[k], pool.locks[k])
+
+
+@compiled
+def _better(energy: float, taste: float, other: float, other_taste: float) -> bool:
+    if max(energy, other) < EXACT:
+        return taste < other_taste - 1e-9
+    return energy < other * (1 - 1e-9)
+
+
+@compiled
+def offer(pool: Pool, layout: Layout, energy: float, taste: float) -> None:
+    """Put a layout into the pool, best first, unless an equal one is there or all are better."""
+    size = len(pool.energies)
+    at = size
+    for k in range(size):
+        if abs(pool.taste[k] - taste) < 1e-7 and abs(pool.energies[k] - energy) < EXACT:
+            return
+        if at == size and _better(energy, taste, pool.energies[k], pool.taste[k]):
+            at = k
+    if at == size:
+        return
+    for k in range(size - 1, at, -1):
+        pool.rows[k], pool.kinds[k] = pool.rows[k - 1], pool.kinds[k - 1]
+        pool.locks[k] = pool.locks[k - 1]
+        pool.energies[k], pool.taste[k] = pool.energies[k - 1], pool.taste[k - 1]
+    pool.rows[at], pool.kinds[at], pool.locks[at] = layout.rows, layout.kinds, layout.locks
+    pool.energies[at], pool.taste[at] = energy, taste
+
+
+@compiled
+def settle(pool: Pool, layout: Layout, target: Target, work: Work) -> float:
+    """Polish `layout` in place and offer it to the pool; returns its energy."""
+    polish(layout, target, work)
+    drop_redundant(layout)
+    energy = layout_energy(layout, target, work)
+    if valid(layout, target.storey_height):
+        offer(pool, layout, energy, clumsiness(layout, work))
+    return energy
+
+
+@compiled
+def informed_round(
+    pool: Pool, base: Layout, target: Target, rng: np.random.Generator, work: Work
+) -> None:
+    """Draw STARTS layouts around `base`, polish the most promising, offer them to `pool`."""
+    size = (POLISHED, CAPACITY)
+    best = Pool(
+        np.zeros((POLISHED, CAPACITY, 5)),
+        np.full(size, -1, dtype=np.int64),
+        np.zeros(size, dtype=np.int64),
+        np.full(POLISHED, np.inf),
+        np.full(POLISHED, np.inf),
+    )
+    layout = Layout(base.rows.copy(), base.kinds.copy(), base.locks.copy())
+    for _ in range(STARTS):
+        draw_start(base, target, rng, layout)
+        if valid(layout, target.storey_height):
+            energy = layout_energy(layout, target, work)
+            offer(best, layout, energy + BOX_PRICE * box_count(layout.kinds), 0.0)
+    for k in range(POLISHED):
+        if best.energies[k] < np.inf:
+            settle(pool, pooled(best, k), target, work)

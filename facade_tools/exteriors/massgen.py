@@ -1,0 +1,149 @@
+"""From attributes to mass models with roofs (FW16 6.1), from scratch or around known boxes."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..artifacts.attributes import Attributes
+from ..artifacts.building import Box, Building, Energy
+from ..errors import Infeasible
+from .annealing import RESTARTS, search
+from .mass_attributes import KINDS
+from .mass_candidates import diverse
+from .mass_energy import Target, layout_of, mass_energy, relative_residuals
+from .mass_hints import search_target
+from .mass_layout import EMPTY, Layout, move_to_origin, new_work
+from .mass_polish import round_layout
+from .mass_roofs import chimney_of, draw_roof_plan, roofed, with_tower
+from .mass_search import new_pool, pooled
+
+log = logging.getLogger("facade_tools.massgen")
+
+POOL = 48
+GRAIN = 1e-3  # generated positions and sizes are rounded to it (m)
+MET = 0.01  # a group whose relative residual is less counts as met
+
+
+@dataclass(frozen=True, slots=True)
+class Mass:
+    """Boxes of one mass, their energy, and its shares by attribute group."""
+
+    boxes: tuple[Box, ...]
+    energy: float
+    shares: dict[str, float]
+
+
+def generate_mass(
+    attributes: Attributes,
+    *,
+    rng: np.random.Generator,
+    keep: Building | None = None,
+    candidates: int = 1,
+    require: float | None = None,
+) -> Iterator[Building]:
+    """Yield buildings (boxes and roofs, no facades) whose mass attributes are those wanted.
+
+    Unknown attributes leave the search free. keep: boxes that stay exactly as they are, with
+    what is `complete`; their unknown heights and roofs are filled in. candidates: how many, in
+    order of energy, mutually different (see `mass_candidates`). require: raises Infeasible where
+    the best energy is above it. `energy.residuals` names the groups that the result misses.
+    """
+    target = search_target(attributes, keep, rng=rng)
+    masses = find_masses(target, keep, candidates, rng=rng)
+    if require is not None and (not masses or masses[0].energy > require):
+        reached = f"{masses[0].energy:.3g}" if masses else "no layout"
+        raise Infeasible(f"mass energy {reached}; required at most {require:g}")
+    if masses and masses[0].energy > 1e-3:
+        missed = ", ".join(relative_residuals(masses[0].shares, MET)) or "none"
+        log.warning("%s: energy %.3g; not met: %s", attributes.id, masses[0].energy, missed)
+    for number, mass in enumerate(masses, start=1):
+        name = attributes.id if candidates == 1 else f"{attributes.id}-{number}"
+        yield _finished(name, attributes, mass, keep, rng=rng)
+
+
+def find_masses(
+    target: Target, keep: Building | None, count: int, *, rng: np.random.Generator
+) -> list[Mass]:
+    """Return up to `count` different masses around the boxes of `keep`, best first."""
+    known = keep.boxes if keep else ()
+    base = layout_of(known, locked=True)
+    pool = new_pool(POOL)
+    rounds = 2 if count == 1 else 4 + count
+    search(pool, base, target, rng, new_work(), np.array([rounds, RESTARTS]))
+    found = []
+    for k in np.flatnonzero(np.isfinite(pool.energies)).tolist():
+        layout = pooled(pool, k)
+        if not known:
+            move_to_origin(layout)
+        round_layout(layout, GRAIN)
+        boxes = boxes_of(layout, known)
+        found.append(Mass(boxes, *mass_energy(boxes, target)))
+    return diverse(found, count)
+
+
+def boxes_of(layout: Layout, known: Sequence[Box]) -> tuple[Box, ...]:
+    """Return the boxes of a layout without roofs; the first ones are the `known` ones."""
+    boxes = [
+        box if box.height is not None else replace(box, height=float(layout.rows[k, 4]))
+        for k, box in enumerate(known)
+    ]
+    names = {box.id for box in boxes}
+    new = [k for k in range(len(known), len(layout.kinds)) if layout.kinds[k] != EMPTY]
+    for k in sorted(new, key=lambda k: (layout.kinds[k], -_volume(layout.rows[k]))):
+        kind = KINDS[layout.kinds[k]]
+        name = _free_name("main" if not names and kind == "general" else _NAMES[kind], names)
+        names.add(name)
+        x0, y0, x1, y1, height = layout.rows[k].tolist()
+        centre = round((x0 + x1) / 2, 9), round((y0 + y1) / 2, 9)
+        size = round(x1 - x0, 9), round(y1 - y0, 9), round(height, 9)
+        boxes.append(Box(name, kind, *centre, *size))  # type: ignore[arg-type]
+    return tuple(boxes)
+
+
+_NAMES = {"general": "wing", "garage": "garage", "porch": "porch"}
+
+
+def _volume(row: np.ndarray) -> float:
+    return float((row[2] - row[0]) * (row[3] - row[1]) * row[4])
+
+
+def _free_name(name: str, taken: set[str]) -> str:
+    numbered = (f"{name}-{n}" for n in range(2, len(taken) + 3))
+    return next(n for n in (name, *numbered) if n not in taken)
+
+
+def _finished(
+    name: str,
+    attributes: Attributes,
+    mass: Mass,
+    keep: Building | None,
+    *,
+    rng: np.random.Generator,
+) -> Building:
+    """Return the building of a mass: towers, roofs, chimneys, energy."""
+    special = attributes.element.special
+    wanted = {part for part in ("chimney", "tower") if special.get(part) == 1}
+    wanted |= set(keep.features) if keep else set()
+    tower = "tower" in wanted and not any(b.roof and b.roof.style == "cone" for b in mass.boxes)
+    boxes = with_tower(mass.boxes, rng=rng) if tower else mass.boxes
+    boxes = roofed(boxes, draw_roof_plan(attributes.element, rng=rng), tower=tower)
+    chimneys = keep.chimneys if keep else ()
+    if "chimney" in wanted and not chimneys:
+        chimney = chimney_of(boxes, rng=rng)
+        chimneys = (chimney,) if chimney else ()
+    cones = any(b.roof and b.roof.style == "cone" for b in boxes)
+    features = [part for part, there in (("chimney", chimneys), ("tower", cones)) if there]
+    return Building(
+        id=name,
+        boxes=boxes,
+        facades=keep.facades if keep else {},
+        storey_height=attributes.storey_height,
+        features=tuple(part for part in features if part in wanted),
+        chimneys=chimneys,
+        targets=replace(attributes, provenance=None),
+        energy=Energy(mass=mass.energy, residuals=relative_residuals(mass.shares, MET)),
+    )

@@ -17,6 +17,8 @@ from .workers import AHEAD, Outcome, attempt, map_in_workers
 if TYPE_CHECKING:
     from distributed import Client
 
+__all__ = ["Outcome", "attempt", "map_ordered"]
+
 T = TypeVar("T")
 R = TypeVar("R")
 

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from functools import cache
 from importlib import import_module
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 from ..errors import InvalidInput, Place
 from .codec import from_json, to_json
@@ -19,8 +19,10 @@ KINDS: dict[str, str] = {
     "blocks": "blocks:Blocks",
     "building": "building:Building",
     "footprint": "footprint:Footprint",
+    "grammar": "grammar:Grammar",
     "library": "library:Library",
     "model": "model:Model",
+    "parse": "parse:Parse",
 }
 
 MAX_YAML_BYTES = 4 << 20
@@ -29,7 +31,7 @@ MAX_YAML_BYTES = 4 << 20
 class Artifact(Protocol):
     """What every artifact has: the kind (its class's name on disk)."""
 
-    kind: Any
+    kind: ClassVar[str]
 
 
 def parse_json(data: bytes) -> Any:

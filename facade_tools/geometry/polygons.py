@@ -20,8 +20,8 @@ def signed_area(ring: Points2) -> float:
     """
     if len(ring) < 3:
         return 0.0
-    x, y = (ring - ring[0]).T
-    return 0.5 * float(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
+    x, y = (ring[1:] - ring[0]).T
+    return 0.5 * float(x[:-1] @ y[1:] - y[:-1] @ x[1:])
 
 
 def oriented(rings: Iterable[Sequence[Sequence[float]] | Points2]) -> Rings:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from facade_tools.artifacts.building import Box, Building
+from facade_tools.artifacts.building import Building
 from facade_tools.artifacts.footprint import Footprint
 from facade_tools.errors import InvalidInput
 
-from .polygons import oriented
-from .roofs import Patch, box_roof
+from .roofs import footprint_patches, union_patches
 from .solids_envelope import envelope_solid
 from .solids_surface import Face, Label, Semantic, Solid, triangulated
 
@@ -18,7 +17,6 @@ __all__ = [
     "Solid",
     "building_solid",
     "footprint_solid",
-    "roof_patches",
     "triangulated",
 ]
 
@@ -34,14 +32,15 @@ def building_solid(building: Building) -> Solid:
     for place, box in enumerate(building.boxes):
         if box.kind != "porch" and not box.height:
             raise InvalidInput("a box needs a height", pointer=f"/boxes/{place}/height")
-    return envelope_solid(roof_patches(boxes))
-
-
-def roof_patches(boxes: list[Box]) -> list[Patch]:
-    """Return the patches whose upper envelope is the roof of the union of the boxes."""
-    return [patch for box in boxes for patch in box_roof(box)]
+    return envelope_solid(union_patches(boxes))
 
 
 def footprint_solid(footprint: Footprint) -> Solid:
-    """Return the extrusion of a footprint with its roof as one closed solid."""
-    return envelope_solid([Patch(oriented(footprint.polygon), (0.0, 0.0, footprint.height))])
+    """Return the extrusion of a footprint with its roof as one closed solid.
+
+    Raises InvalidInput when its polygon has no area.
+    """
+    patches = footprint_patches(footprint)
+    if not patches:
+        raise InvalidInput("the polygon has no area", pointer="/polygon")
+    return envelope_solid(patches)

@@ -7,6 +7,7 @@ from the cells alone, so that no rounding of a height can open the surface.
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from dataclasses import dataclass, field
 
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from .arrays import Floats, Integers, Points2
 from .polygons import rings_of, shape_of
-from .roofs import Patch
+from .roofs_patch import Patch
 from .solids_merge import Piece, merged
 from .solids_pinch import unpinched
 from .solids_surface import Label, Solid
@@ -49,7 +50,8 @@ def envelope_solid(patches: list[Patch]) -> Solid:
 def _cells(patches: list[Patch]) -> _Plan:
     shapes = np.array([shape_of(patch.rings) for patch in patches], dtype=object)
     planes = np.array([patch.plane for patch in patches])
-    lines = np.concatenate([shapely.boundary(shapes), _meeting_lines(shapes, planes)])
+    groups = np.array([patch.group for patch in patches])
+    lines = np.concatenate([shapely.boundary(shapes), _meeting_lines(shapes, planes, groups)])
     noded = shapely.unary_union(lines, grid_size=GRID)
     cells = shapely.get_parts(shapely.polygonize(shapely.get_parts(noded)))
     cells = cells[shapely.area(cells) > 0]
@@ -57,7 +59,7 @@ def _cells(patches: list[Patch]) -> _Plan:
     return _indexed(cells, top)
 
 
-def _meeting_lines(shapes: Shapes, planes: Floats) -> Shapes:
+def _meeting_lines(shapes: Shapes, planes: Floats, groups: Integers) -> Shapes:
     """Return where the planes of two overlapping patches are equally high, within both.
 
     Patches that only touch cross in a point of their common border; the line within the first
@@ -65,7 +67,8 @@ def _meeting_lines(shapes: Shapes, planes: Floats) -> Shapes:
     """
     tree = shapely.STRtree(shapes)
     first, second = tree.query(shapes)
-    first, second = first[first < second], second[first < second]
+    chosen = groups[first] < groups[second]
+    first, second = first[chosen], second[chosen]
     difference = planes[first] - planes[second]
     crossing = np.hypot(difference[:, 0], difference[:, 1]) > 1e-9
     first, second, difference = first[crossing], second[crossing], difference[crossing]
@@ -190,10 +193,10 @@ def _walls(plan: _Plan, patches: list[Patch], pillars: _Pillars) -> list[Piece]:
 def _higher(
     plan: _Plan, patches: list[Patch], edge: tuple[int, int], here: int, there: int
 ) -> bool:
-    x, y = (plan.points[edge[0]] + plan.points[edge[1]]) / 2
-    a, b, c = np.subtract(patches[here].plane, patches[there].plane)
-    difference = a * x + b * y + c
-    return bool(difference > 0 or (difference == 0 and here > there))
+    (x0, y0), (x1, y1) = plan.points[edge[0]].tolist(), plan.points[edge[1]].tolist()
+    (a, b, c), (d, e, f) = patches[here].plane, patches[there].plane
+    difference = (a - d) * (x0 + x1) / 2 + (b - e) * (y0 + y1) / 2 + c - f
+    return difference > 0 or (difference == 0 and here > there)
 
 
 def _wall_ring(pillars: _Pillars, edge: tuple[int, int], high: int, low: int) -> list[int]:
@@ -214,6 +217,7 @@ def _chain(pillars: _Pillars, point: int, start: int, stop: int) -> list[int]:
 
 def _line_of(start: Points2, end: Points2) -> tuple[float, float, float]:
     """Return the unit normal and offset of the line, rounded, equal for pieces of one wall."""
-    direction = (end - start) / np.hypot(*(end - start))
-    a, b = round(float(direction[1]), 4), round(-float(direction[0]), 4)
-    return a, b, round(a * float(start[0]) + b * float(start[1]), 3)
+    (x0, y0), (x1, y1) = start.tolist(), end.tolist()
+    length = math.hypot(x1 - x0, y1 - y0)
+    a, b = round((y1 - y0) / length, 4), round((x0 - x1) / length, 4)
+    return a, b, round(a * x0 + b * y0, 3)

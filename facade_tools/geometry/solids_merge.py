@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from dataclasses import dataclass
 
 import numpy as np
 
 from .arrays import Floats, Integers, Points3
+from .polygons import signed_area
 from .solids_surface import Face, Label, Solid
 from .triangulate import flattened, newell_normal
 
@@ -49,9 +51,10 @@ def _joined(vertices: Points3, pieces: list[Piece]) -> list[Face]:
                     edges[ring[k - 1], end] = None
     if not edges:
         return []
-    normal = sum(newell_normal(vertices[piece.rings[0]]) for piece in pieces)
-    loops = _loops(vertices, list(edges), np.asarray(normal))
-    return _nested(vertices, loops, np.asarray(normal))
+    if len(pieces) == 1:
+        return [tuple(tuple(ring) for ring in pieces[0].rings)]
+    normal = np.sum([newell_normal(vertices[piece.rings[0]]) for piece in pieces], axis=0)
+    return _nested(vertices, _loops(vertices, list(edges), normal), normal)
 
 
 def _loops(vertices: Points3, edges: list[Edge], normal: Floats) -> list[list[int]]:
@@ -92,7 +95,7 @@ def _angle(ahead: Floats, back: Floats) -> float:
 def _nested(vertices: Points3, loops: list[list[int]], normal: Floats) -> list[Face]:
     """Give each hole (clockwise loop) to the smallest outer loop around it."""
     flats = [flattened(vertices[loop], normal) for loop in loops]
-    areas = [_area(flat) for flat in flats]
+    areas = [signed_area(flat) for flat in flats]
     outer = [k for k in range(len(loops)) if areas[k] > 0]
     faces = {k: [tuple(loops[k])] for k in outer}
     for k in range(len(loops)):
@@ -101,11 +104,6 @@ def _nested(vertices: Points3, loops: list[list[int]], normal: Floats) -> list[F
             if around:
                 faces[min(around, key=lambda j: areas[j])].append(tuple(loops[k]))
     return [tuple(rings) for rings in faces.values()]
-
-
-def _area(flat: Floats) -> float:
-    x, y = (flat - flat[0]).T
-    return float(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
 
 
 def _contains(ring: Floats, hole: Floats) -> bool:
@@ -135,10 +133,10 @@ def _without_straight(vertices: Points3, faces: list[Face]) -> list[Face]:
 
 
 def _is_straight(vertices: Points3, middle: int, start: int, end: int) -> bool:
-    along = vertices[end] - vertices[start]
-    aside = np.cross(along, vertices[middle] - vertices[start])
-    length = np.linalg.norm(along)
-    return bool(np.linalg.norm(aside) <= 1e-5 * length)
+    x, y, z = (vertices[end] - vertices[start]).tolist()
+    u, v, w = (vertices[middle] - vertices[start]).tolist()
+    aside = math.hypot(y * w - z * v, z * u - x * w, x * v - y * u)
+    return aside <= 1e-5 * math.hypot(x, y, z)
 
 
 def _compact(vertices: Points3, faces: list[Face], labels: list[Label]) -> Solid:

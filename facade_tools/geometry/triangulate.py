@@ -12,8 +12,9 @@ from .arrays import Floats, Integers, Points2, Points3, Triangles
 
 def newell_normal(points: Points3) -> Floats:
     """Return twice the area vector (3,) of the closed ring `points` (n, 3)."""
-    following = np.roll(points, -1, axis=0)
-    return np.asarray(np.cross(points, following).sum(axis=0), dtype=np.float64)
+    local = points[1:] - points[0]
+    (x, y, z), (u, v, w) = local[:-1].T, local[1:].T
+    return np.array([y @ w - z @ v, z @ u - x @ w, x @ v - y @ u])
 
 
 def flattened(points: Points3, normal: Floats) -> Points2:

@@ -1,0 +1,182 @@
+"""Roofs over any polygon, laid on its straight skeleton (docs/roofs.md, section 3)."""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+import shapely
+
+from facade_tools.artifacts.building import Roof
+from facade_tools.artifacts.footprint import Footprint
+
+from .arrays import Floats
+from .polygons import Rings, rings_of, sound
+from .roofs_patch import FLAT, Patch, Plane, mansard_profile, slope_of
+from .skeleton import Contour, Skeleton, SkeletonFailed, straight_skeleton
+
+LOG = logging.getLogger("facade_tools.geometry")
+OPPOSITE = -0.8  # cosine of the angle between the two walls beside a gable
+
+
+def footprint_patches(footprint: Footprint) -> list[Patch]:
+    """Return the patches of the roof of a footprint, repaired where its rings are not sound."""
+    patches: list[Patch] = []
+    for rings in sound(footprint.polygon):
+        parts = sloped_patches(rings, footprint.height, footprint.roof or FLAT)
+        patches += [Patch(part.rings, part.plane, "", len(patches)) for part in parts]
+    return patches
+
+
+def sloped_patches(rings: Rings, eaves: float, roof: Roof) -> list[Patch]:
+    """Return the patches of a roof of any style over a polygon; they tile it.
+
+    rings: outer ring counter-clockwise, holes clockwise (m). eaves: their height (m). A polygon
+    whose skeleton cannot be found gets a flat roof, with a warning in the log.
+    """
+    if roof.style == "flat" or slope_of(roof) <= 0:
+        return [Patch(rings, (0.0, 0.0, eaves))]
+    if roof.style == "shed":
+        return [_shed(rings, eaves, roof)]
+    try:
+        return _skeletal(rings, eaves, roof)
+    except SkeletonFailed as problem:
+        LOG.warning("flat roof instead of %s: %s", roof.style, problem)
+        return [Patch(rings, (0.0, 0.0, eaves))]
+
+
+def _skeletal(rings: Rings, eaves: float, roof: Roof) -> list[Patch]:
+    contour = Contour.of(rings)
+    skeleton = straight_skeleton(rings)
+    if roof.style == "cone" and _is_convex(contour):
+        return _pyramid(contour, eaves, float(skeleton.times.max()) * slope_of(roof))
+    if roof.style == "gable":
+        contour, skeleton = _gabled(rings, contour, skeleton, roof)
+    if roof.style == "mansard":
+        return _mansard(contour, skeleton, eaves, roof)
+    distances = _distances(contour)
+    return [
+        Patch([skeleton.points[face]], _raised(distances[k], slope_of(roof), eaves))
+        for k, face in enumerate(skeleton.faces)
+        if contour.speeds[k] > 0 and len(face) > 2
+    ]
+
+
+def _shed(rings: Rings, eaves: float, roof: Roof) -> Patch:
+    axis = 0 if roof.direction == "x" else 1
+    low = float(rings[0][:, axis].min())
+    slope = slope_of(roof)
+    plane = (slope, 0.0, eaves - slope * low) if axis == 0 else (0.0, slope, eaves - slope * low)
+    return Patch(rings, plane)
+
+
+def _distances(contour: Contour) -> list[Plane]:
+    """Return per edge (a, b, c): the distance of (x, y) from its line is a·x + b·y + c."""
+    _, normal, offset = contour.frames()
+    return [(float(a), float(b), -float(c)) for (a, b), c in zip(normal, offset, strict=True)]
+
+
+def _raised(distance: Plane, slope: float, base: float) -> Plane:
+    a, b, c = distance
+    return a * slope, b * slope, c * slope + base
+
+
+def _is_convex(contour: Contour) -> bool:
+    return bool(np.all(_turns(contour) > -1e-9))
+
+
+def _turns(contour: Contour) -> Floats:
+    """Return the sine of the turn at the end of each edge, positive to the left."""
+    along, _, _ = contour.frames()
+    after = along[contour.following]
+    return np.asarray(along[:, 0] * after[:, 1] - along[:, 1] * after[:, 0])
+
+
+def _pyramid(contour: Contour, eaves: float, rise: float) -> list[Patch]:
+    """Return triangles from every edge to an apex above the centroid."""
+    apex = shapely.get_coordinates(shapely.centroid(shapely.Polygon(contour.points)))[0]
+    patches = []
+    for a, b, c in _distances(contour):
+        slope = rise / (a * apex[0] + b * apex[1] + c)
+        patches.append(_raised((a, b, c), float(slope), eaves))
+    ends = contour.points[contour.following]
+    return [
+        Patch([np.array([start, end, apex])], plane)
+        for start, end, plane in zip(contour.points, ends, patches, strict=True)
+    ]
+
+
+# --- gables ---------------------------------------------------------------------------------------
+def _gabled(
+    rings: Rings, contour: Contour, skeleton: Skeleton, roof: Roof
+) -> tuple[Contour, Skeleton]:
+    """Return contour and skeleton with gables at the ends; hipped where that has no roof."""
+    ends = gable_edges(contour, skeleton, roof)
+    speeds = np.ones(len(contour.points))
+    speeds[ends] = 0.0
+    try:
+        return Contour.of(rings, speeds), straight_skeleton(rings, speeds)
+    except SkeletonFailed:
+        LOG.info("no roof with gables at edges %s: hipped instead", ends)
+        return contour, skeleton
+
+
+def gable_edges(contour: Contour, skeleton: Skeleton, roof: Roof) -> list[int]:
+    """Return the edges that get a gable: ends whose hip is a triangle between facing walls.
+
+    Where several meet, those come first that the ridge's direction runs into.
+    """
+    along, _, _ = contour.frames()
+    before = np.empty(len(along), dtype=np.int64)
+    before[contour.following] = np.arange(len(along))
+    facing = np.sum(along[before] * along[contour.following], axis=1) < OPPOSITE
+    turns = _turns(contour)
+    convex = (turns > 1e-6) & (turns[before] > 1e-6)
+    small = np.array([len(face) == 3 for face in skeleton.faces])
+    if len(along) == 4:
+        small[:] = True
+    axis = along[:, 0 if roof.direction == "x" else 1]
+    chosen: list[int] = []
+    for k in np.argsort(np.round(np.abs(axis), 6), kind="stable").tolist():
+        neighbours = {int(before[k]), int(contour.following[k])}
+        if facing[k] and convex[k] and small[k] and not neighbours & set(chosen):
+            chosen.append(k)
+    return chosen
+
+
+# --- mansards -------------------------------------------------------------------------------------
+def _mansard(contour: Contour, skeleton: Skeleton, eaves: float, roof: Roof) -> list[Patch]:
+    """Return the faces cut at the height where the slope changes."""
+    inset, lower, upper = mansard_profile(roof, float(skeleton.times.max()))
+    patches = []
+    for distance, (low, high) in zip(
+        _distances(contour), truncated(contour, skeleton, inset), strict=True
+    ):
+        base = eaves + inset * (lower - upper)
+        patches += [Patch(rings, _raised(distance, lower, eaves)) for rings in low]
+        patches += [Patch(rings, _raised(distance, upper, base)) for rings in high]
+    return patches
+
+
+def truncated(
+    contour: Contour, skeleton: Skeleton, time: float
+) -> list[tuple[list[Rings], list[Rings]]]:
+    """Return per face its polygons below and above the wavefront's place at `time`."""
+    along, normal, _ = contour.frames()
+    reach = 2.0 * float(np.ptp(skeleton.points, axis=0).sum())
+    found = []
+    for k, face in enumerate(skeleton.faces):
+        shape = shapely.Polygon(skeleton.points[face])
+        far, side = reach * normal[k], reach * along[k]
+        level = contour.points[k] + time * contour.speeds[k] * normal[k]
+        above = shapely.Polygon(
+            [level - side, level + side, level + side + far, level - side + far]
+        )
+        parts = shapely.difference(shape, above), shapely.intersection(shape, above)
+        found.append((_polygons(parts[0]), _polygons(parts[1])))
+    return found
+
+
+def _polygons(shape: shapely.Geometry) -> list[Rings]:
+    parts = [part for part in shapely.get_parts(shape) if isinstance(part, shapely.Polygon)]
+    return [rings_of(part) for part in parts if part.area > 1e-9]

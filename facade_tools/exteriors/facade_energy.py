@@ -15,20 +15,24 @@ from .facade_attributes import facade_vector, pack_facades, side_values
 from .facade_layout import (
     CENTRE,
     CLEAR,
+    ABOVE,
     CODE,
     DOOR,
+    GROUND,
+    LOW,
     LOWER,
     OPEN,
     QUIET,
     SUB,
     TALL,
+    UPPER,
     WIDTH,
     Side,
 )
 from .facade_sizing import sized
 
 LEAST_TARGET = 0.1  # a difference is divided by max(target, this)
-NARROW, WIDE = 0.5, 1.5  # bounds of eq. 5, times the average size
+WIDE = 1.5  # upper bound of eq. 5, times the average size (the lower stands in `subs`)
 TASTE = 1e-3  # weight of what only looks better: far below what eq. 4 can tell apart
 
 
@@ -71,7 +75,7 @@ def widths(side: Side, genome: Floats, counts: Integers) -> Floats:
     """
     k = len(side.subs)
     number, tall = np.zeros(k), np.zeros(k)
-    low, high = NARROW * side.subs[:, WIDTH], WIDE * side.subs[:, WIDTH]
+    low, high = side.subs[:, LOW].copy(), WIDE * side.subs[:, WIDTH]
     area = 0.0
     wall = 0.0
     for p in range(len(side.pieces)):
@@ -151,19 +155,41 @@ def _has_door(side: Side, genome: Floats, counts: Integers) -> bool:
 
 @compiled
 def _taste(side: Side, genome: Floats, counts: Integers, wide: Floats) -> float:
+    return _uneven(side, genome, counts, wide) + _unusual(side, genome, counts, wide)
+
+
+@compiled
+def _uneven(side: Side, genome: Floats, counts: Integers, wide: Floats) -> float:
+    """Return how unevenly the windows are spread over the walls, in shares of their area."""
+    ratio = side.targets[0] if not np.isnan(side.targets[0]) else 0.15
     wall = 0.0
-    empty = 0.0
+    uneven = 0.0
+    for p in range(len(side.pieces)):
+        if side.room[p, OPEN] == 0.0 or side.room[p, QUIET] > 0.0:
+            continue
+        area = side.pieces[p, 4] * side.pieces[p, 5]
+        glass = 0.0
+        for e in range(counts[p]):
+            glass += wide[int(genome[p, e, SUB])] * genome[p, e, TALL]
+        wall += area
+        uneven += abs(glass - ratio * area) / max(ratio, LEAST_TARGET)
+    return uneven / wall if wall > 0.0 else 0.0
+
+
+@compiled
+def _unusual(side: Side, genome: Floats, counts: Integers, wide: Floats) -> float:
+    """Return how far sizes are from their average, and kinds from their share in the library."""
+    k = len(side.subs)
+    have, usual = np.zeros(k), np.zeros(k)
     stretch = 0.0
     n = 0
     for p in range(len(side.pieces)):
-        if side.room[p, OPEN] == 0.0:
-            continue
-        area = side.pieces[p, 4] * side.pieces[p, 5]
-        wall += area
-        if counts[p] == 0 and side.room[p, QUIET] == 0.0 and side.pieces[p, 4] > 1.6:
-            empty += area
+        column = ABOVE if side.room[p, UPPER] > 0.0 else GROUND
+        weights = side.subs[:, column] / max(side.subs[:, column].sum(), 1e-9)
         for e in range(counts[p]):
             sub = int(genome[p, e, SUB])
+            have[sub] += 1.0
             stretch += (wide[sub] / side.subs[sub, WIDTH] - 1.0) ** 2
+            usual += weights
             n += 1
-    return (empty / wall if wall > 0.0 else 0.0) + 4.0 * (stretch / n if n else 0.0)
+    return float(4.0 * stretch + np.abs(have - usual).sum() / 2) / n if n else 0.0

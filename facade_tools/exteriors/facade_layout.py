@@ -20,11 +20,12 @@ EDGE = 0.2  # wall between an element and its piece's border (m)
 GAP = 0.16  # wall between two elements (m)
 LOWEST_SILL = 0.1  # over the storey's floor or the roof below (m)
 LEAST_HEIGHT = 0.45  # of a window (m)
+AIR = 0.002  # so that rounding to millimetres touches nothing (m)
 SQUEEZE = 0.75  # an element is placed where it has at least this share of its usual width
 
 SUB, CENTRE, LOWER, TALL, CLEAR = range(5)  # columns of a genome's element
 FLOOR, HEAD, UPPER, OPEN, QUIET = range(5)  # columns of `room`
-CODE, WIDTH, HEIGHT, DOOR = range(4)  # columns of `subs`; then weight on ground and upper storeys
+CODE, WIDTH, HEIGHT, DOOR, GROUND, ABOVE, TWIN, LOW = range(8)  # columns of `subs`
 
 
 class Side(NamedTuple):
@@ -34,7 +35,8 @@ class Side(NamedTuple):
     room (p, 5): v of the storey's floor and of the window heads; 1 in an upper storey; 1 where
     elements may be placed; 1 where few are expected (garages). fixed (f, 5): code, u, v, width,
     height of what stands. blocked (b, 5): piece, u0, v0, u1, v1. stacked (m, 2): lower and upper
-    piece. subs (k, 6). door (5,): piece that takes the main door or −1, range of its centre,
+    piece. subs (k, 8): number of kind and style, average width and height, 1 for doors, weight on the
+    ground and above, the narrow twin's row (or −1), least width. door (5,): piece that takes the main door or −1, range of its centre,
     substyle, share of draws at the middle of the range. targets (3,): wwr, sym, align, or NaN.
     """
 
@@ -96,7 +98,7 @@ def _free_width(side: Side, p: int, u: float, lower: float, tall: float) -> floa
         row = side.fixed[k]
         if row[2] < lower + tall + GAP and row[2] + row[4] > lower - GAP:
             clear = min(clear, 2.0 * (max(row[1] - u, u - row[1] - row[3]) - GAP))
-    return float(clear)
+    return float(clear - 2.0 * AIR)
 
 
 @compiled
@@ -258,8 +260,7 @@ def draw_piece(
     even = rng.random() < 0.1 + 0.8 * sym
     row = genome[p]
     n = _draw_door(rng, side, p, even, row) if side.door[0] == p else 0
-    weights = side.subs[:, 5] if side.room[p, UPPER] > 0.0 else side.subs[:, 4]
-    sub = pick(rng, weights * (1.0 - side.subs[:, DOOR]))
+    sub = _window(rng, side, p)
     if sub < 0:
         counts[p] = n
         return
@@ -277,22 +278,34 @@ def draw_piece(
         centres = spread(rng, length, width, _number(rng, side, p, sub), not uneven)
         if not even and not uneven:
             centres = _thinned(rng, centres)
-    counts[p] = _fill(rng, side, p, sub, centres, row, n, even)
+    counts[p] = _fill(rng, side, (p, sub, even), centres, row, n)
+
+
+@compiled
+def _window(rng: np.random.Generator, side: Side, p: int) -> int:
+    """Draw a piece's substyle of windows: a narrow one where the drawn one is too wide; or −1."""
+    weights = side.subs[:, ABOVE] if side.room[p, UPPER] > 0.0 else side.subs[:, GROUND]
+    sub = pick(rng, weights * (1.0 - side.subs[:, DOOR]))
+    if sub >= 0 and SQUEEZE * side.subs[sub, WIDTH] + 2.0 * (EDGE + AIR) > side.pieces[p, 4]:
+        return int(side.subs[sub, TWIN])
+    return sub
 
 
 @compiled
 def _fill(
     rng: np.random.Generator,
     side: Side,
-    p: int,
-    sub: int,
+    what: tuple[int, int, bool],
     centres: Floats,
     row: Floats,
     n: int,
-    even: bool,
 ) -> int:
-    """Place elements at the centres; now and then one (or a mirrored pair) of another kind."""
-    weights = side.subs[:, 5] if side.room[p, UPPER] > 0.0 else side.subs[:, 4]
+    """Place elements at the centres; now and then one (or a mirrored pair) of another kind.
+
+    what: piece, substyle, whether the piece is to be symmetric.
+    """
+    p, sub, even = what
+    weights = side.subs[:, ABOVE] if side.room[p, UPPER] > 0.0 else side.subs[:, GROUND]
     m = len(centres)
     other, at = sub, -1
     if m and rng.random() < 0.3:

@@ -12,7 +12,19 @@ from ..artifacts.building import Side as SideName
 from ..geometry.arrays import Floats, Integers
 from ..geometry.blocked import blocked_rectangles
 from .facade_attributes import pack_facades, stacked
-from .facade_layout import CENTRE, CODE, LOWER, SUB, TALL, Side
+from .facade_layout import (
+    ABOVE,
+    CENTRE,
+    CODE,
+    GROUND,
+    LOW,
+    LOWER,
+    SUB,
+    TALL,
+    TWIN,
+    WIDTH,
+    Side,
+)
 from .facade_parts import Codes, MainDoor, PartRow
 from .kept import Standing
 from .library import END, storey_of
@@ -20,6 +32,7 @@ from .library import END, storey_of
 LOW_ROOM = 1.9  # least height of a piece over its storey's floor that takes windows (m)
 NARROW_ROOM = 0.9  # least width of such a piece (m)
 OVER_HEAD = 0.15  # least wall between a window's head and the top of its piece (m)
+NARROW = 0.5  # lower bound of eq. 5, times the average width
 LEVEL_HEAD = 1.9  # a storey's heads are not lowered under this for one low piece (m)
 
 
@@ -98,27 +111,41 @@ def _room(
 
 
 def sub_table(rows: Sequence[PartRow], codes: Codes, side: SideName) -> Floats:
-    """Return the substyles (k, 6) with the weights that they have on a side.
+    """Return the substyles (k, 8) with the weights that they have on a side.
 
     Where the library's building has no window on such a side or storey, its windows elsewhere
     stand in.
     """
-    table = np.zeros((len(rows), 6))
+    windows = [k for k, row in enumerate(rows) if row.kind == "window"]
+    table = np.zeros((len(rows) + len(windows), 8))
     for k, row in enumerate(rows):
         door = row.kind == "door"
         table[k, :4] = codes.number(row.kind, row.style), row.width, row.height, door
+        table[k, TWIN], table[k, LOW] = -1.0, NARROW * row.width
         for level in (0, 1):
             table[k, 4 + level] = row.weights.get((END[side], level), 0.0)
-    window = table[:, 3] == 0.0
+    _add_twins(table, windows)
+    window = np.array([row.kind == "window" for row in rows])
     for level in (0, 1):
         for group in ([(s, level) for s in _KINDS], [(s, lv) for s in _KINDS for lv in (0, 1)]):
-            if not table[window, 4 + level].any():
+            if not table[: len(rows)][window, 4 + level].any():
                 weights = [sum(row.weights.get(key, 0.0) for key in group) for row in rows]
-                table[:, 4 + level] += np.where(window, weights, 0.0)
+                table[: len(rows), 4 + level] += np.where(window, weights, 0.0)
+    doors = np.flatnonzero(~window)
     if side == "front":
-        table[~window, 4:] = 0.0
-    table[~window, 5] = 0.0
+        table[doors, GROUND] = 0.0
+    table[doors, ABOVE] = 0.0
     return table
+
+
+def _add_twins(table: Floats, windows: Sequence[int]) -> None:
+    """Fill the last rows with narrow twins of the windows, for walls that are too narrow."""
+    first = len(table) - len(windows)
+    for twin, k in enumerate(windows, start=first):
+        table[twin, :4] = table[k, :4]
+        table[twin, WIDTH] = max(0.6 * table[k, WIDTH], min(0.45, table[k, WIDTH]))
+        table[twin, TWIN], table[twin, LOW] = -1.0, NARROW * table[k, WIDTH]
+        table[k, TWIN] = twin
 
 
 _KINDS = tuple(dict.fromkeys(END[side] for side in SIDES))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -24,8 +24,9 @@ from .kept import Standing, standing_sides
 from .library import ElementLibrary, default_library
 from .palette import house_colors
 
-SIMILAR = 3  # buildings among which the one that lends its elements is drawn
+SIMILAR = 3  # buildings that may lend their elements, in random order
 TRIES = 3  # walls in which the main door is tried where the first does not do
+ENOUGH = 5e-3  # energy that needs no elements of another library building
 GOOD = 2e-3  # energy of a side that needs no further try
 MISSED = 0.05  # relative difference from which an attribute counts as not met
 
@@ -61,12 +62,23 @@ def generate_facades(
     shelf = options.library or default_library()
     for number, own in enumerate(rng.spawn(options.candidates), start=1):
         identity = building.id if options.candidates == 1 else f"{building.id}-{number}"
-        entry = shelf.nearest(_known(building), SIMILAR, own)
-        wanted = _wanted(building, entry)
-        facades = _Facades(building, shelf, entry, options, own).all(wanted)
-        colors = building.colors or house_colors([entry], rng=own)
-        done = replace(building, id=identity, facades=facades, colors=colors)
-        yield replace(done, energy=_energy(done, wanted))
+        similar = shelf.nearest(_known(building), SIMILAR, own)
+        wanted = _wanted(building, similar[0])
+        tries = (_Attempt(building, shelf, entry, options, own) for entry in similar)
+        yield replace(_first_good(attempt.finished(wanted) for attempt in tries), id=identity)
+
+
+def _first_good(buildings: Iterable[Building]) -> Building:
+    """Return the first building that meets its targets well enough, or else the best."""
+    best, least = None, np.inf
+    for building in buildings:
+        value = np.inf if building.energy is None else building.energy.facade or 0.0
+        if best is None or value < least:
+            best, least = building, value
+        if least <= ENOUGH:
+            break
+    assert best is not None
+    return best
 
 
 def _refuse_unfinished(building: Building) -> None:
@@ -91,7 +103,7 @@ def _wanted(building: Building, entry: LibraryBuilding) -> FacadeAttributes:
 
 
 @dataclass(frozen=True, slots=True)
-class _Facades:
+class _Attempt:
     """One candidate in the making: the building, its elements' source, its random numbers."""
 
     building: Building
@@ -100,8 +112,13 @@ class _Facades:
     options: FacadeOptions
     rng: np.random.Generator
 
-    def all(self, wanted: FacadeAttributes) -> dict[Side, Facade]:
-        """Return the facades of all four sides."""
+    def finished(self, wanted: FacadeAttributes) -> Building:
+        """Return the building with facades, colours and energy."""
+        colors = self.building.colors or house_colors([self.entry], rng=self.rng)
+        done = replace(self.building, facades=self._facades(wanted), colors=colors)
+        return replace(done, energy=_energy(done, wanted))
+
+    def _facades(self, wanted: FacadeAttributes) -> dict[Side, Facade]:
         library = self.shelf.library
         rows, codes = part_rows(library, self.entry), Codes()
         sides = self._standing()

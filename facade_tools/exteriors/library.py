@@ -60,12 +60,14 @@ class ElementLibrary:
         known = np.maximum((~np.isnan(mass)).sum(axis=1), 1)
         return np.asarray(bits + np.nansum(mass, axis=1) / known / 3.001)
 
-    def nearest(self, wanted: Attributes, among: int, rng: np.random.Generator) -> LibraryBuilding:
-        """Return one of the `among` most similar buildings that share the fewest wrong bits."""
+    def nearest(
+        self, wanted: Attributes, among: int, rng: np.random.Generator
+    ) -> list[LibraryBuilding]:
+        """Return of the `among` most similar buildings those of fewest wrong bits, in random order."""
         distances = self.distances(wanted)
         order = np.argsort(distances, kind="stable")[:among]
         near = order[np.floor(distances[order]) == np.floor(distances[order[0]])]
-        return self.library.buildings[int(near[int(rng.integers(len(near)))])]
+        return [self.library.buildings[int(k)] for k in rng.permutation(near)]
 
 
 @cache

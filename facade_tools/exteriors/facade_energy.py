@@ -13,9 +13,9 @@ from ..compiled import compiled
 from ..geometry.arrays import Floats, Integers
 from .facade_attributes import facade_vector, pack_facades, side_values
 from .facade_layout import (
+    ABOVE,
     CENTRE,
     CLEAR,
-    ABOVE,
     CODE,
     DOOR,
     GROUND,

@@ -35,9 +35,10 @@ class Side(NamedTuple):
     room (p, 5): v of the storey's floor and of the window heads; 1 in an upper storey; 1 where
     elements may be placed; 1 where few are expected (garages). fixed (f, 5): code, u, v, width,
     height of what stands. blocked (b, 5): piece, u0, v0, u1, v1. stacked (m, 2): lower and upper
-    piece. subs (k, 8): number of kind and style, average width and height, 1 for doors, weight on the
-    ground and above, the narrow twin's row (or −1), least width. door (5,): piece that takes the main door or −1, range of its centre,
-    substyle, share of draws at the middle of the range. targets (3,): wwr, sym, align, or NaN.
+    piece. subs (k, 8): number of kind and style, average width and height, 1 for doors, weight on
+    the ground and above, row of the narrow twin or −1, least width. door (5,): piece that takes
+    the main door or −1, range of its centre, substyle, share of draws at the middle of the range.
+    targets (3,): wwr, sym, align, or NaN.
     """
 
     pieces: Floats

@@ -17,7 +17,7 @@ from .mass_energy import MOST_BOXES, Target, layout_energy
 from .mass_layout import CAPACITY, EMPTY, HEIGHT_LOCKED, PLAN_LOCKED, Layout, Work, copy_layout
 from .mass_polish import valid
 from .mass_search import EXACT, Pool, informed_round, pooled, settle
-from .mass_starts import add_box, box_count, free_row, part_row
+from .mass_starts import add_box, box_count, free_row, holds_part, part_row
 
 THRESHOLD = 1e-3  # FW16: stop below it …
 ITERATIONS = 10_000  # … or after as many proposals
@@ -86,7 +86,7 @@ def _add(layout: Layout, target: Target, rng: np.random.Generator) -> int:
     frame = np.array([x, y, x + target.values[0], y + target.values[1]])
     pick = int(rng.random() * 6)
     start = (GARAGE_AT, PORCH_AT, PORCH_AT + 6)[pick] if pick < 3 else -1
-    if start >= 0 and target.values[start + 2] > 0:
+    if start >= 0 and target.values[start + 2] > 0 and not holds_part(layout, frame, pick):
         kind = GARAGE if start == GARAGE_AT else PORCH
         return add_box(layout, kind, part_row(target.values[start : start + 6], frame))
     if target.extra == 0:

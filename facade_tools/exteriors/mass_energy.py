@@ -59,13 +59,15 @@ class Target(NamedTuple):
     """What an energy wants.
 
     values: (27,); weights: (27,) of each squared difference, 0 where the value is unknown and only
-    a hint to the search. extra: how many general boxes may be added to the locked ones.
+    a hint to the search. extra: how many general boxes may be added to the locked ones. tower:
+    whether one box should suit a tower.
     """
 
     values: Floats
     weights: Floats
     storey_height: float
     extra: int
+    tower: bool
 
 
 def target_of(attributes: Attributes, without: Iterable[str] = ()) -> Target:
@@ -77,7 +79,8 @@ def target_of(attributes: Attributes, without: Iterable[str] = ()) -> Target:
     for name, place in GROUPS.items():
         norm = float((values[place] ** 2).sum()) or ABSENT_NORM
         weights[place] = 0.0 if name in without else known[place] / norm
-    return Target(values, weights, float(attributes.storey_height), MOST_BOXES)
+    tower = attributes.element.special.get("tower") == 1
+    return Target(values, weights, float(attributes.storey_height), MOST_BOXES, tower)
 
 
 @compiled

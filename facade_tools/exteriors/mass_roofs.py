@@ -14,9 +14,8 @@ import numpy as np
 
 from ..artifacts.attributes import ROOF_BITS, ElementAttributes
 from ..artifacts.building import Axis, Box, Chimney, Roof, RoofStyle
+from .mass_taste import TOWER_RATIO, TOWER_WIDTH
 
-TOWER_WIDTH = 4.6  # widest plan of a tower (m)
-TOWER_RATIO = 1.5  # of its sides
 CHIMNEY = 0.7  # width of a chimney (m)
 CHIMNEY_ABOVE = 0.7  # a chimney's top above the highest roof it passes (m)
 CONE_PITCH = 58.0

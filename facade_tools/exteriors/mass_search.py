@@ -14,7 +14,7 @@ from .mass_polish import polish, valid
 from .mass_starts import box_count, draw_start, drop_redundant
 from .mass_taste import clumsiness
 
-STARTS = 1500  # drawn a round
+STARTS = 300  # drawn a round
 POLISHED = 16  # of them polished
 BOX_PRICE = 0.003  # of energy: prefers the simpler of equal starts
 EXACT = 1e-8  # energies below it are equally good
@@ -82,7 +82,7 @@ def settle(pool: Pool, layout: Layout, target: Target, work: Work) -> float:
     drop_redundant(layout)
     energy = layout_energy(layout, target, work)
     if valid(layout, target.storey_height):
-        offer(pool, layout, energy, clumsiness(layout, work))
+        offer(pool, layout, energy, clumsiness(layout, target.tower, work))
     return energy
 
 
@@ -101,7 +101,7 @@ def informed_round(
     )
     layout = Layout(base.rows.copy(), base.kinds.copy(), base.locks.copy())
     for _ in range(STARTS):
-        draw_start(base, target, rng, layout)
+        draw_start(base, target, rng, work, layout)
         if valid(layout, target.storey_height):
             energy = layout_energy(layout, target, work)
             offer(best, layout, energy + BOX_PRICE * box_count(layout.kinds), 0.0)

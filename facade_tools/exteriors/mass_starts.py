@@ -11,20 +11,22 @@ import numpy as np
 
 from ..compiled import compiled
 from ..geometry.arrays import Floats, Integers
-from .mass_attributes import ARF, GARAGE, GARAGE_AT, GENERAL, PORCH, PORCH_AT
-from .mass_energy import Target
+from .mass_attributes import ARF, GARAGE, GARAGE_AT, GENERAL, PORCH
+from .mass_energy import Target, layout_energy
 from .mass_layout import (
     CAPACITY,
     EMPTY,
     HEIGHT_LOCKED,
     PLAN_LOCKED,
     Layout,
+    Work,
     copy_layout,
 )
 
 FREE_LINES = 2  # a direction
 SNAP = 0.02  # of given parts to the bounding box (m)
 LEAST_SPAN = 1.8  # of a drawn general box (m)
+TRIES = 10  # drawn boxes, of which the best is taken
 MOST_DRAWN = 5
 FULL_SPAN = 0.35  # chance that a box runs through the whole bounding box, a direction
 LOWER = 0.35  # chance that a box is lower than the highest
@@ -94,25 +96,25 @@ def part_row(values: Floats, frame: Floats) -> Floats:
 
 
 @compiled
-def place_parts(layout: Layout, target: Target, frame: Floats) -> None:
-    """Add the target's garage and porches where the layout has none of the kind yet."""
-    if target.values[GARAGE_AT + 2] >= 0.5 and not _holds(layout, GARAGE):
-        add_box(layout, GARAGE, part_row(target.values[GARAGE_AT : GARAGE_AT + 6], frame))
-    for part in range(2):
-        start = PORCH_AT + 6 * part
-        if target.values[start + 2] >= 0.5 and not _has_porch(layout, frame, part):
-            add_box(layout, PORCH, part_row(target.values[start : start + 6], frame))
+def holds_part(layout: Layout, frame: Floats, part: int) -> bool:
+    """Tell whether there is a garage (part 0), a front porch (1) or a back porch (2)."""
+    for k in range(CAPACITY):
+        behind = layout.rows[k, 1] + layout.rows[k, 3] >= frame[1] + frame[3]
+        if layout.kinds[k] == GARAGE and part == 0:
+            return True
+        if layout.kinds[k] == PORCH and part == (2 if behind else 1):
+            return True
+    return False
 
 
 @compiled
-def _has_porch(layout: Layout, frame: Floats, part: int) -> bool:
-    """Tell whether there is a porch before (part 0) or behind (1) the middle of the frame."""
-    for k in range(CAPACITY):
-        if layout.kinds[k] == PORCH:
-            behind = layout.rows[k, 1] + layout.rows[k, 3] >= frame[1] + frame[3]
-            if part == (1 if behind else 0):
-                return True
-    return False
+def place_parts(layout: Layout, target: Target, frame: Floats) -> None:
+    """Add the target's garage and porches where the layout has none of the kind yet."""
+    for part in range(3):
+        start = GARAGE_AT + 6 * part
+        if target.values[start + 2] >= 0.5 and not holds_part(layout, frame, part):
+            row = part_row(target.values[start : start + 6], frame)
+            add_box(layout, GARAGE if part == 0 else PORCH, row)
 
 
 @compiled
@@ -170,7 +172,7 @@ def _fill_heights(layout: Layout, target: Target, rng: np.random.Generator) -> N
             continue
         if layout.locks[k] & PLAN_LOCKED:
             known = 2.6 if layout.kinds[k] == PORCH else 0.9 * target.storey_height
-            start = GARAGE_AT if layout.kinds[k] == GARAGE else PORCH_AT
+            start = GARAGE_AT if layout.kinds[k] == GARAGE else GARAGE_AT + 6
             if layout.kinds[k] == GENERAL:
                 known = _draw_height(target, rng)
             elif target.values[start + 4] > 1.0:
@@ -179,8 +181,36 @@ def _fill_heights(layout: Layout, target: Target, rng: np.random.Generator) -> N
 
 
 @compiled
-def draw_start(base: Layout, target: Target, rng: np.random.Generator, out: Layout) -> None:
-    """Draw a layout around the locked boxes of `base` into `out`."""
+def _draw_row(
+    xs: Floats, ys: Floats, target: Target, highest: bool, rng: np.random.Generator
+) -> Floats:
+    row = np.empty(5)
+    row[0], row[2] = _draw_span(xs, rng)
+    row[1], row[3] = _draw_span(ys, rng)
+    row[4] = target.values[2] if highest else _draw_height(target, rng)
+    return row
+
+
+@compiled
+def _draw_tower(frame: Floats, height: float, rng: np.random.Generator) -> Floats:
+    """Return a small square box in a corner of the frame, more often a front one."""
+    row = np.empty(5)
+    side = 2.4 + 1.6 * rng.random()
+    right, back = rng.random() < 0.5, rng.random() < 0.2
+    row[0] = frame[2] - side if right else frame[0]
+    row[1] = frame[3] - side if back else frame[1]
+    row[2], row[3], row[4] = row[0] + side, row[1] + side, height
+    return row
+
+
+@compiled
+def draw_start(
+    base: Layout, target: Target, rng: np.random.Generator, work: Work, out: Layout
+) -> None:
+    """Draw a layout around the locked boxes of `base` into `out`.
+
+    Each general box is the best, by energy, of a few drawn ones.
+    """
     copy_layout(base, out)
     frame = np.empty(4)
     for axis in range(2):
@@ -189,13 +219,23 @@ def draw_start(base: Layout, target: Target, rng: np.random.Generator, out: Layo
     place_parts(out, target, frame)
     _fill_heights(out, target, rng)
     xs, ys = _anchor_lines(out, frame, 0, rng), _anchor_lines(out, frame, 1, rng)
+    lower = target.tower and rng.random() < 0.8
+    if lower:
+        add_box(out, GENERAL, _draw_tower(frame, target.values[2], rng))
     locked = _holds(base, GENERAL)
     count = min(int(rng.random() ** 1.6 * MOST_DRAWN) + (0 if locked else 1), target.extra)
+    tries = TRIES if rng.random() < 0.7 else 1
     for number in range(count):
-        row = np.empty(5)
-        row[0], row[2] = _draw_span(xs, rng)
-        row[1], row[3] = _draw_span(ys, rng)
-        row[4] = target.values[2] if number == 0 and not locked else _draw_height(target, rng)
+        highest = number == 0 and not locked and not lower
+        row = _draw_row(xs, ys, target, highest, rng)
+        least = np.inf
+        for _ in range(tries):
+            trial = _draw_row(xs, ys, target, highest, rng)
+            k = add_box(out, GENERAL, trial)
+            energy = layout_energy(out, target, work)
+            out.kinds[k] = EMPTY
+            if energy < least:
+                row, least = trial, energy
         if not _redundant(out, row):
             add_box(out, GENERAL, row)
 

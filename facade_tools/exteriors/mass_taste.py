@@ -17,6 +17,8 @@ from .mass_layout import CAPACITY, EMPTY, Layout, Work, thinness
 LEAST_JOG = 0.8  # distance of neighbouring wall lines (m)
 LEAST_STEP = 0.45  # difference of eaves heights (m)
 SLIM = 2.4  # a wing or a gap thinner than this looks odd (m)
+TOWER_WIDTH = 4.6  # widest plan of a tower (m)
+TOWER_RATIO = 1.5  # of its sides at most
 CAR = 2.4  # free wall that a garage door needs (m)
 
 
@@ -50,8 +52,8 @@ def _near_heights(layout: Layout) -> float:
 
 
 @compiled
-def _corners(work: Work) -> tuple[int, int]:
-    """Return the number of outline corners of all floors, and of cells that nothing covers."""
+def _corners(work: Work) -> int:
+    """Return the number of outline corners of all floors."""
     corners = 0
     for floor in range(FLOORS):
         for i in range(work.size[0]):
@@ -61,7 +63,7 @@ def _corners(work: Work) -> tuple[int, int]:
                     for dj in range(2):
                         full += work.levels[i + di, j + dj] > floor
                 corners += full % 2
-    return corners, 0
+    return corners
 
 
 @compiled
@@ -81,11 +83,31 @@ def _door_walls(layout: Layout, k: int, work: Work) -> tuple[float, float]:
 
 
 @compiled
-def clumsiness(layout: Layout, work: Work) -> float:
-    """Return a penalty ≥ 0 (no unit) of a layout whose grid `work` describes."""
+def _towerless(layout: Layout) -> bool:
+    """Tell whether no general box is small, about square, and as high as the highest."""
+    top = 0.0
+    for k in range(CAPACITY):
+        if layout.kinds[k] == GENERAL:
+            top = max(top, layout.rows[k, 4])
+    for k in range(CAPACITY):
+        x0, y0, x1, y1, height = layout.rows[k]
+        small, large = min(x1 - x0, y1 - y0), max(x1 - x0, y1 - y0)
+        fits = small >= 1.8 and large <= min(TOWER_WIDTH, TOWER_RATIO * small)
+        if layout.kinds[k] == GENERAL and height >= top - 1e-6 and fits:
+            return False
+    return True
+
+
+@compiled
+def clumsiness(layout: Layout, tower: bool, work: Work) -> float:
+    """Return a penalty ≥ 0 (no unit) of a layout whose grid `work` describes.
+
+    tower: whether one box should be small and high enough to be a tower.
+    """
     total = 1.5 * _near_lines(layout) + 2.0 * _near_heights(layout)
     total += 2.0 * thinness(work, SLIM)
-    total += 0.12 * _corners(work)[0]
+    total += 0.12 * _corners(work)
+    total += 3.0 if tower and _towerless(layout) else 0.0
     for k in range(CAPACITY):
         kind = layout.kinds[k]
         total += 0.35 if kind == GENERAL else 0.0

@@ -41,6 +41,8 @@ class Format:
 FORMATS = (
     Format("HOT2000", "hot2000"),
     Format("CityJSON", "cityjson_reader"),
+    Format("CityGML", "citygml"),
+    Format("GeoJSON", "geojson"),
 )
 
 

@@ -26,6 +26,7 @@ MOST_SURFACES = 200_000
 HIGHEST = 400.0  # metres
 LARGEST = 2000.0  # metres
 DOOR_WEIGHT = 2.0  # the street side has the door
+HIGHEST_PORCH = 4.5  # metres
 QUARTERS = ("front", "right", "back", "left")
 OPENINGS: tuple[ElementKind, ...] = ("window", "door")
 
@@ -191,6 +192,9 @@ def _neighbours(
                 notes[f"{neighbour.kind} apart from its house: left out"] += 1
                 continue
             kind: BoxKind = "garage" if neighbour.kind == "garage" else "porch"
+            if kind == "porch" and mass.eaves > HIGHEST_PORCH:
+                notes["canopy higher than 4.5 m: left out"] += 1
+                continue
             found.append(Mass(plan, mass.eaves, mass.planes, mass.code, kind))
     return found
 

@@ -20,7 +20,8 @@ DETAIL_SHARE = 0.12  # of the footprint: likewise
 LEFT_OVER = 1.0  # m²: footprint without a roof above it that is worth a place
 SAME_EAVES = 0.2  # metres: eaves nearer than this are level
 LOWEST = 1.6  # metres: lower masses are terraces and ramps
-CHIMNEY_SIDE = 2.5  # metres: no chimney is wider
+CHIMNEY_SIDE = (0.2, 2.5)  # metres: least and largest width of a chimney
+CHIMNEY_RISE = 0.2  # metres above the highest roof around it
 
 
 @dataclass(frozen=True)
@@ -116,7 +117,7 @@ def _levelled(found: list[Mass], notes: Counter[str]) -> list[Mass]:
             notes["mass lower than 1.6 m: left out"] += 1
             continue
         same = [m.eaves for m in level if abs(m.eaves - mass.eaves) < SAME_EAVES]
-        eaves = same[0] if same else round(mass.eaves, 6)
+        eaves = same[0] if same else round(mass.eaves, 3)
         level.append(Mass(mass.plan, eaves, mass.planes, mass.code, mass.kind))
     return level
 
@@ -170,19 +171,19 @@ def chimneys(
 def _chimney(
     surfaces: tuple[Surface, ...], planes: Sequence[Plane], ground: float
 ) -> Chimney | None:
+    """Return a thin upright body that rises out of the roof on all its sides.
+
+    A dormer's top meets the roof on the uphill side, so it is none.
+    """
     low, high = bounds(surfaces)
     width, depth = float(high[0] - low[0]), float(high[1] - low[1])
-    middle = (low + high)[:2] / 2.0
-    roof = height_at(planes, middle)
-    upright = min(width, depth) >= 0.2 and max(width, depth) <= CHIMNEY_SIDE
-    if (
-        roof is None
-        or not upright
-        or high[2] < roof + 0.4
-        or max(width, depth) > 4.0 * min(width, depth)
-    ):
+    x, y = (float(value) for value in (low + high)[:2] / 2.0)
+    if not CHIMNEY_SIDE[0] <= min(width, depth) <= max(width, depth) <= CHIMNEY_SIDE[1]:
         return None
-    x, y = float(middle[0]), float(middle[1])
-    return Chimney(
-        round(x, 6), round(y, 6), round(width, 6), round(depth, 6), float(high[2]) - ground
-    )
+    corners = [(a, b) for a in (low[0], high[0]) for b in (low[1], high[1])]
+    around = [height_at(planes, np.array(corner)) for corner in (*corners, (x, y))]
+    heights = [height for height in around if height is not None]
+    if around[-1] is None or high[2] < max(heights) + CHIMNEY_RISE:
+        return None
+    size = round(width, 3), round(depth, 3)
+    return Chimney(round(x, 3), round(y, 3), *size, round(float(high[2]) - ground, 3))

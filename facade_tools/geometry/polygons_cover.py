@@ -7,7 +7,7 @@ import numpy as np
 from .arrays import Booleans, Floats, Integers, Rectangles
 
 MOST_RECTANGLES = 64  # of one polygon; a round tower is no reason for a thousand boxes
-SPARE = 2e-3  # of the area: stop when only this much is left uncovered
+SPARE = 5e-3  # of the area: stop when only this much is left uncovered
 
 
 def cover(inside: Booleans, xs: Floats, ys: Floats) -> Rectangles:

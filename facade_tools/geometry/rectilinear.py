@@ -16,10 +16,10 @@ from .arrays import Booleans, Floats, Integers, Points2, Rectangles
 from .polygons_cover import cover
 
 AXIS_ANGLE = 12.0  # degrees: an edge nearer to an axis than this is a wall along it
-JOG = 0.2  # metres: walls nearer to each other than this stand in one line
+JOG = 0.45  # metres: walls nearer to each other than this stand in one line
 STEP = 1.2  # metres: an oblique edge becomes stairs of about this tread
 MOST_LINES = 60  # a direction, so that a round tower costs no more than a house
-LEAST_SIDE = 0.4  # metres: thinner slivers are dropped
+LEAST_SIDE = 0.6  # metres: thinner slivers are dropped
 INSIDE = 0.5  # share of a cell that must be covered to count
 
 
@@ -149,7 +149,7 @@ def _edge_lines(start: Floats, stop: Floats, axis: int) -> list[tuple[float, flo
 
 
 def _clustered(places: Floats, weights: Floats, jog: float) -> Floats:
-    """Return weighted means of runs of places none of which is wider than `jog`.
+    """Return weighted means (whole millimetres) of runs of places, none wider than `jog`.
 
     Heavy places come first and take the light ones near them along.
     """
@@ -164,7 +164,7 @@ def _clustered(places: Floats, weights: Floats, jog: float) -> Floats:
             centres.append(float(places[index]))
             members.append([index])
     means = [float(np.average(places[rows], weights=weights[rows] ** 2)) for rows in members]
-    return np.unique(np.round(means, 6))
+    return np.unique(np.round(means, 3))
 
 
 def _owners(polygons: Sequence[BaseGeometry], xs: Floats, ys: Floats) -> Integers:

@@ -1,0 +1,156 @@
+"""OpenStreetMap's Simple 3D Buildings tags to eaves and roof."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from ..artifacts.building import Axis, Roof, RoofStyle
+from ..errors import InvalidInput
+from .surfaces_roofs import CODES
+
+LEVEL_HEIGHT = 3.0  # metres a level, as the tagging scheme says
+LEAST_WALL = 2.5  # metres of wall that must stay under the roof
+USUAL_PITCH: Mapping[RoofStyle, float] = {"shed": 10.0, "mansard": 30.0, "flat": 0.0}
+USUAL = 30.0  # degrees, of every other style
+STEEPEST = 75.0
+LEVELS = 2  # of a building that states neither height nor levels
+SMALL = ("garage", "garages", "carport", "shed", "hut", "roof", "kiosk", "greenhouse")
+OTHER_THINGS = ("highway", "waterway", "landuse", "natural", "leisure", "railway", "boundary")
+LENGTH = re.compile(r"^\s*([0-9]+(?:[.,][0-9]+)?)\s*(m|metres?|meters?|ft|feet|')?\s*$")
+FEET = re.compile(r"^\s*([0-9]+)\s*'\s*(?:([0-9]+)\s*\")?\s*$")
+COMPASS = ("N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE")
+COMPASS_SOUTH = ("S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW")
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """Eaves (m) and roof of a footprint."""
+
+    height: float
+    roof: Roof
+
+
+def length(value: object) -> float | None:
+    """Return metres of a length as mappers write it (`7.5`, `7,5 m`, `24 ft`, `24'6"`), or None."""
+    text = str(value)
+    if match := FEET.match(text):
+        return 0.3048 * (float(match[1]) + float(match[2] or 0) / 12.0)
+    if match := LENGTH.match(text):
+        factor = 0.3048 if (match[2] or "").startswith(("f", "'")) else 1.0
+        return factor * float(match[1].replace(",", "."))
+    return None
+
+
+def is_building(tags: Mapping[str, object]) -> bool:
+    """Tell whether a polygon is a building: it says so, or it says nothing else."""
+    if "building" in tags:
+        return tags["building"] not in ("no", None)
+    return not any(key in tags for key in (*OTHER_THINGS, "building:part"))
+
+
+def shape_of(
+    tags: Mapping[str, object], plan: BaseGeometry, turn: float, notes: Counter[str]
+) -> Shape:
+    """Return eaves and roof of a building by its tags.
+
+    plan: the footprint along the axes, metres; turn: degrees by which the map was turned
+    clockwise to get there. The tag `height` is the roof's top: the roof is subtracted, and where
+    less than 2.5 m of wall would be left, its pitch is lowered.
+    """
+    style = _style(tags)
+    direction = _direction(tags, plan, turn, style)
+    span = _span(plan, style, direction)
+    pitch = _pitch(tags, style, span)
+    total, eaves = _heights(tags, notes)
+    if eaves is None:
+        rise = span * math.tan(math.radians(pitch))
+        eaves = (total or 0.0) - rise
+        if eaves < LEAST_WALL and pitch > 0.0:
+            notes["less than 2.5 m of wall under the roof: pitch lowered"] += 1
+            eaves = min(LEAST_WALL, total or 0.0)
+            pitch = math.degrees(math.atan2((total or 0.0) - eaves, span))
+    if not 1.0 <= eaves <= 500.0:
+        raise InvalidInput(f"eaves at {eaves:.2f} m; expected 1 m to 500 m")
+    if pitch < 0.5:
+        return Shape(round(eaves, 6), Roof("flat", 0.0, direction))
+    return Shape(round(eaves, 6), Roof(style, round(pitch, 6), direction))
+
+
+def _style(tags: Mapping[str, object]) -> RoofStyle:
+    return CODES.get(str(tags.get("roof:shape", "flat")).lower(), "flat")
+
+
+def _heights(tags: Mapping[str, object], notes: Counter[str]) -> tuple[float | None, float | None]:
+    """Return the height of the roof's top, or that of the eaves, whichever is stated."""
+    total = length(tags.get("height", tags.get("building:height", "")))
+    if total:
+        return total, None
+    levels = length(tags.get("building:levels", tags.get("levels", "")))
+    if levels:
+        return None, LEVEL_HEIGHT * levels
+    notes["neither height nor levels: 6 m assumed, 3 m of a garage or shed"] += 1
+    small = str(tags.get("building", "")) in SMALL
+    return None, LEVEL_HEIGHT * (1 if small else LEVELS)
+
+
+def _pitch(tags: Mapping[str, object], style: RoofStyle, span: float) -> float:
+    if style == "flat":
+        return 0.0
+    angle = length(str(tags.get("roof:angle", "")).rstrip("° "))
+    rise = length(tags.get("roof:height", ""))
+    if rise is None and (levels := length(tags.get("roof:levels", ""))):
+        rise = LEVEL_HEIGHT * levels
+    if rise is not None and span > 0.0:
+        return min(math.degrees(math.atan2(rise, span)), STEEPEST)
+    return min(USUAL_PITCH.get(style, USUAL) if angle is None else angle, STEEPEST)
+
+
+def _direction(
+    tags: Mapping[str, object], plan: BaseGeometry, turn: float, style: RoofStyle
+) -> Axis:
+    """Return the axis of the ridge, or of a shed's fall, in the turned plan."""
+    bearing = _bearing(tags.get("roof:direction"))
+    x0, y0, x1, y1 = plan.bounds
+    along: Axis = "x" if x1 - x0 >= y1 - y0 else "y"
+    if bearing is not None:
+        # The roof faces this way: counter-clockwise from east, then into the turned plan.
+        faces = (90.0 - bearing - turn) % 180.0
+        falls: Axis = "x" if faces < 45.0 or faces > 135.0 else "y"
+        return falls if style == "shed" else _other(falls)
+    across = str(tags.get("roof:orientation", "along")) == "across"
+    ridge = _other(along) if across else along
+    return _other(ridge) if style == "shed" else ridge
+
+
+def _other(axis: Axis) -> Axis:
+    return "y" if axis == "x" else "x"
+
+
+def _bearing(value: object) -> float | None:
+    text = str(value).strip().rstrip("°")
+    points = COMPASS + COMPASS_SOUTH
+    if text.upper() in points:
+        return 22.5 * points.index(text.upper())
+    return length(text)
+
+
+def _span(plan: BaseGeometry, style: RoofStyle, direction: Axis) -> float:
+    """Return the horizontal length over which the roof rises, metres."""
+    x0, y0, x1, y1 = plan.bounds
+    width, depth = x1 - x0, y1 - y0
+    if style == "shed":
+        return width if direction == "x" else depth
+    if style == "gable":
+        return (depth if direction == "x" else width) / 2.0
+    return min(width, depth, 2.0 * _inradius(plan)) / 2.0
+
+
+def _inradius(plan: BaseGeometry) -> float:
+    return float(shapely.maximum_inscribed_circle(plan, tolerance=0.05).length)

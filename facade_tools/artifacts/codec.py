@@ -76,7 +76,11 @@ def _default(field: dataclasses.Field[Any]) -> Any:
 def _object_decoder(cls: Any) -> Convert:
     hints = typing.get_type_hints(cls)
     fields = [field for field in dataclasses.fields(cls) if field.init]
-    decoders = {field.name: _decoder(hints[field.name]) for field in fields}
+    decoders = {
+        field.name: _deferred(hint) if _mentions(hint, cls) else _decoder(hint)
+        for field in fields
+        for hint in [hints[field.name]]
+    }
     plain = frozenset(name for name, decode in decoders.items() if decode is None)
     nested = {name: decode for name, decode in decoders.items() if decode is not None}
     known = frozenset(decoders)
@@ -90,6 +94,20 @@ def _object_decoder(cls: Any) -> Convert:
         return cls(**values)
 
     return decode if known else lambda _: cls()
+
+
+def _mentions(hint: Any, cls: Any) -> bool:
+    return hint is cls or any(_mentions(argument, cls) for argument in get_args(hint))
+
+
+def _deferred(hint: Any) -> Convert:
+    """Return the converter of a tree's own kind of node, made when the first node comes."""
+
+    def decode(item: Any) -> Any:
+        decoder = _decoder(hint)
+        return item if decoder is None else decoder(item)
+
+    return decode
 
 
 def _decoder(hint: Any) -> Convert | None:

@@ -1,0 +1,178 @@
+"""The body of `facade parse-image`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facade_tools.artifacts.documents import encode
+from facade_tools.artifacts.numbers import dump_document, dump_line
+from facade_tools.artifacts.provenance import Provenance, Source
+from facade_tools.artifacts.writing import write_bytes
+from facade_tools.errors import FacadeError, InvalidInput
+from facade_tools.formats.png import write as write_png
+from facade_tools.grammar.reading import Method, Reading, ReadOptions
+from facade_tools.imaging.image_io import PICTURES, Photo, read_labels, read_photo
+from facade_tools.imaging.label_views import overlay
+from facade_tools.parallel import map_ordered
+from facade_tools.randomness import item_generator
+
+from ._items import load
+from ._options import StreamOptions
+from ._report import Progress, say_error
+from ._stream import file_name, is_folder, open_sink, side_input
+from .parse_image import METHODS
+
+NAME = "parse-image"
+
+
+@dataclass(frozen=True)
+class ParseOptions:
+    """What the command line asks for."""
+
+    classifier: str | None
+    grammar: str | None
+    method: str
+    solver: str
+    mask: str | None
+    labels: str | None
+    raw_labels: str | None
+    overlay: str | None
+
+    @property
+    def recorded(self) -> dict[str, str | None]:
+        """Options that can change the content."""
+        return {
+            "method": self.method, "solver": self.solver, "mask": self.mask and Path(self.mask).name,
+            "grammar": self.grammar and Path(self.grammar).name,
+            "classifier": self.classifier and Path(self.classifier).name,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Result:
+    """Bytes of a parse and of the pictures that were asked for, by option."""
+
+    id: str
+    parse: bytes
+    pictures: dict[str, bytes]
+
+
+@dataclass(frozen=True)
+class Read:
+    """Reads one picture in any process."""
+
+    options: ParseOptions
+    seed: int
+    sources: tuple[Source, ...]
+    indented: bool
+
+    def __call__(self, path: str) -> Result:
+        """Return everything that becomes of the picture at `path`."""
+        photo = read_photo(path)
+        identity = Path(path).stem
+        rng = item_generator(self.seed, NAME, identity)
+        try:
+            method = _method(self.options.method, _read_options(self.options))
+            reading = method(photo, identity, rng=rng, mask=_mask(self.options.mask))
+        except InvalidInput as error:
+            raise error.at(path) from None
+        except FacadeError as error:
+            raise type(error)(f"{path}: {error}") from None
+        inputs = (Source(photo.name, photo.sha256), *self.sources)
+        provenance = Provenance(NAME, self.seed, self.options.recorded, inputs)
+        document = encode(replace(reading.parse, provenance=provenance))
+        data = dump_document(document) if self.indented else dump_line(document)
+        return Result(identity, data, dict(self._pictures(photo, reading)))
+
+    def _pictures(self, photo: Photo, reading: Reading) -> Iterator[tuple[str, bytes]]:
+        if self.options.labels:
+            yield "labels", write_png(reading.labels)
+        if self.options.raw_labels:
+            yield "raw_labels", write_png(reading.raw)
+        if self.options.overlay:
+            yield "overlay", write_png(overlay(photo.pixels, reading.parse))
+
+
+def _read_options(options: ParseOptions) -> ReadOptions:
+    return ReadOptions(options.classifier, options.grammar, options.solver)
+
+
+@lru_cache(maxsize=1)
+def _method(name: str, options: ReadOptions) -> Method:
+    method: Method = load(METHODS[name])(options)
+    return method
+
+
+@lru_cache(maxsize=1)
+def _mask(path: str | None) -> NDArray[np.bool_] | None:
+    return None if path is None else read_labels(path) > 0
+
+
+def run_parse(stream: StreamOptions, options: ParseOptions) -> None:
+    """Read all pictures; write parses to the output and pictures beside."""
+    method = _method(options.method, _read_options(options))  # its errors come before any picture
+    del method
+    sources = (
+        *side_input(options.classifier),
+        *_grammar_source(options),
+        *side_input(options.mask),
+    )
+    single = stream.output is not None and stream.output.lower().endswith(".json")
+    read = Read(options, stream.seed or 0, sources, single)
+    paths = list(_paths(stream.inputs))
+    outcomes = map_ordered(read, paths, jobs=stream.jobs, scheduler=stream.scheduler)
+    progress = Progress(NAME)
+    bad = 0
+    with open_sink(stream.output) as write, closing(outcomes):
+        for outcome in outcomes:
+            if outcome.value is not None:
+                write(outcome.value.id, outcome.value.parse)
+                _write_pictures(outcome.value, options, len(paths) > 1)
+            elif outcome.error is None:
+                continue
+            elif stream.on_error == "stop" or not isinstance(outcome.error, FacadeError):
+                raise outcome.error
+            else:
+                say_error(NAME, outcome.error)
+                bad += 1
+            progress.advance()
+        progress.close()
+    if bad:
+        raise InvalidInput(f"{bad} bad items were skipped")
+
+
+def _grammar_source(options: ParseOptions) -> tuple[Source, ...]:
+    named = options.grammar
+    return side_input(named) if named is not None and Path(named).is_file() else ()
+
+
+def _paths(inputs: tuple[str, ...]) -> Iterator[str]:
+    for name in inputs:
+        folder = Path(name)
+        if not folder.is_dir():
+            yield name
+            continue
+        found = sorted(p for p in folder.iterdir() if p.suffix.lower() in PICTURES)
+        if not found:
+            raise InvalidInput(f"holds no picture ({', '.join(PICTURES)})").at(name)
+        yield from map(str, found)
+
+
+def _write_pictures(result: Result, options: ParseOptions, many: bool) -> None:
+    for name, data in result.pictures.items():
+        target = getattr(options, name)
+        path = Path(target)
+        if many or is_folder(target):
+            try:
+                path.mkdir(parents=True, exist_ok=True)
+            except OSError:
+                raise InvalidInput("is a file; several pictures need a folder").at(target) from None
+            path = path / f"{file_name(result.id)}.png"
+        write_bytes(path, data)

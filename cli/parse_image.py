@@ -1,0 +1,47 @@
+"""`facade parse-image`: photographs read by a shape grammar."""
+
+from __future__ import annotations
+
+import click
+
+from ._options import StreamOptions, stream_options
+
+# Method -> function(ReadOptions) that returns a Method (facade_tools.grammar.reading); it loads
+# when it is called for.
+METHODS = {
+    "forest": "facade_tools.segmentation.parsing:forest_method",
+}
+
+
+@click.command()
+@stream_options("IMAGE...")
+@click.option("--classifier", metavar="NPZ", help="From train-parser; default: the shipped one.")
+@click.option(
+    "--grammar", metavar="NAME|FILE",
+    help="A shipped grammar (haussmann, haussmann-floors, ...) or a YAML file.  "
+    "[default: haussmann-floors]",
+)  # fmt: skip
+@click.option(
+    "--method", type=click.Choice(list(METHODS)), default="forest", show_default=True,
+    help="forest: trees over pixels and a split grammar (TSKP10).",
+)  # fmt: skip
+@click.option(
+    "--solver", type=click.Choice(["dp", "walk"]), default="dp", show_default=True,
+    help="dp: exact in turn over rows and columns; walk: the paper's random walk.",
+)  # fmt: skip
+@click.option("--mask", metavar="PNG", help="Not 0 where something hides the facade.")
+@click.option("--labels", metavar="PNG", help="Label map of the regions; a folder for many.")
+@click.option("--raw-labels", metavar="PNG", help="Label map of the classifier alone.")
+@click.option("--overlay", metavar="PNG", help="The photograph with the regions over it.")
+def command(stream: StreamOptions, **values: str | None) -> None:
+    """Read rectified photographs of facades: floors, columns, windows, balconies, doors, roofs.
+
+    IMAGE is a picture (JPEG, PNG, TIFF, BMP, WebP) or a folder of them. Use `facade rectify`
+    first where the facade was taken at an angle.
+
+    \b
+    Example: facade parse-image sample_data/photos -o parses.jsonl --overlay overlays/
+    """
+    from ._parsing import ParseOptions, run_parse
+
+    run_parse(stream, ParseOptions(**values))  # type: ignore[arg-type]

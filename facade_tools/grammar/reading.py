@@ -1,0 +1,50 @@
+"""What every method of reading a photograph takes and gives; the methods never import one another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..artifacts.parse import LABELS, Parse
+from ..imaging.image_io import Photo
+
+
+@dataclass(frozen=True, slots=True)
+class ReadOptions:
+    """What a method is built from: a classifier's file, a grammar's name or file, the solver."""
+
+    classifier: str | None = None
+    grammar: str | None = None
+    solver: str = "dp"
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """A parse, the label map of its regions, and the beliefs' own, in pixels of the picture."""
+
+    parse: Parse
+    labels: NDArray[np.uint8]
+    raw: NDArray[np.uint8]
+
+
+class Method(Protocol):
+    """Reads one rectified photograph; `mask` is true where something hides the facade."""
+
+    def __call__(
+        self,
+        photo: Photo,
+        identity: str,
+        *,
+        rng: np.random.Generator,
+        mask: NDArray[np.bool_] | None = None,
+    ) -> Reading:
+        """Return the reading. Raises Infeasible where no derivation fits the picture."""
+        ...
+
+
+def label_index() -> dict[str, int]:
+    """Return the index of each label in label maps."""
+    return {name: i for i, name in enumerate(LABELS)}

@@ -1,0 +1,66 @@
+"""Context features: what an earlier stage of the classifier believes around a pixel."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from .features import Features, Plane, shifted, stacked
+
+Probabilities = NDArray[np.float32]  # (classes, height, width), sums to 1 over the classes
+
+BLURS = (2.0, 6.0)  # pixels
+RUNS = (31, 101)  # pixels
+STEPS = (5, 10, 20, 36, 60)  # pixels
+GAIN = np.float32(255.0)
+
+
+def context_features(probabilities: Probabilities) -> Features:
+    """Return the planes of context of class probabilities (auto-context): the pixel's own, blurred,
+    of its row and column, of neighbours, and how much of each class lies above and below.
+
+    >>> context_features(np.full((2, 4, 6), 0.5, np.float32)).shape[1:]
+    (4, 6)
+    """
+    return stacked([GAIN * plane for one in probabilities for plane in _planes(one)])
+
+
+def _planes(one: Plane) -> Iterator[Plane]:
+    yield one
+    for sigma in BLURS:
+        yield cv2.GaussianBlur(one, (0, 0), sigma)
+    for run in RUNS:
+        yield cv2.blur(one, (run, 3))
+        yield cv2.blur(one, (3, run))
+    yield from _lines(one)
+    yield from _sides(one)
+    smooth = cv2.blur(one, (3, 3))
+    for step in STEPS:
+        for dx, dy in ((step, 0), (-step, 0), (0, step), (0, -step)):
+            yield shifted(smooth, dx, dy)
+
+
+def _lines(one: Plane) -> Iterator[Plane]:
+    rows = one.mean(1, keepdims=True)
+    columns = one.mean(0, keepdims=True)
+    yield np.broadcast_to(rows, one.shape)
+    yield np.broadcast_to(columns, one.shape)
+    yield np.broadcast_to(one.max(1, keepdims=True), one.shape)
+    # a window is where a row of windows crosses a column of them
+    peak = max(float(rows.max()), 1e-6) * max(float(columns.max()), 1e-6)
+    yield rows * columns / np.float32(peak)
+    yield np.broadcast_to(np.float32(one.mean()), one.shape)
+
+
+def _sides(one: Plane) -> Iterator[Plane]:
+    """Share of the column, and of the rows, above the pixel."""
+    height = np.float32(one.shape[0])
+    above = np.cumsum(one, axis=0, dtype=np.float32)
+    yield above / height
+    yield (above[-1:] - above) / height
+    rows = np.cumsum(one.mean(1, keepdims=True), axis=0, dtype=np.float32)
+    yield np.broadcast_to(rows / height, one.shape)
+    yield np.broadcast_to((rows[-1:] - rows) / height, one.shape)

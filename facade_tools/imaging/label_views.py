@@ -1,0 +1,62 @@
+"""Label maps and parses as pictures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..artifacts.parse import LABELS, Parse
+from .image_io import Picture, decoded
+
+COLORS = {
+    "outlier": (20, 20, 20), "window": (226, 60, 50), "wall": (244, 214, 100),
+    "balcony": (128, 40, 210), "door": (240, 140, 30), "roof": (50, 80, 190),
+    "sky": (150, 220, 245), "shop": (60, 170, 80), "chimney": (128, 128, 128),
+}  # fmt: skip
+PALETTE = np.array([COLORS[name] for name in LABELS], np.uint8)
+MAX_VIEW = 1600  # pixels of the longer side
+
+
+def colored(labels: NDArray[np.uint8]) -> Picture:
+    """Return the label map in colours."""
+    picture: Picture = PALETTE[labels]
+    return picture
+
+
+def overlay(picture: Picture, parse: Parse, strength: float = 0.45) -> Picture:
+    """Return a picture with the regions of its parse laid over it, and their borders."""
+    out = picture.copy()
+    for region in parse.regions:
+        part = out[region.y0 : region.y1, region.x0 : region.x1]
+        color = np.array(COLORS.get(region.label, (255, 0, 255)), np.float32)
+        part[:] = ((1 - strength) * part + strength * color).astype(np.uint8)
+    thickness = max(1, round(max(out.shape) / 800))
+    for region in parse.regions:
+        if region.label in ("window", "balcony", "door", "chimney"):
+            color = COLORS[region.label]
+            corners = (region.x0, region.y0), (region.x1 - 1, region.y1 - 1)
+            cv2.rectangle(out, *corners, color, thickness)
+    return out
+
+
+def parse_view(parse: Parse) -> Picture:
+    """Return the regions of a parse in colours."""
+    width, height = parse.image.size
+    canvas = np.zeros((height, width, 3), np.uint8)
+    full = overlay(canvas, parse, 1.0)
+    scale = min(1.0, MAX_VIEW / max(width, height))
+    if scale == 1.0:
+        return full
+    size = (max(1, round(width * scale)), max(1, round(height * scale)))
+    return cv2.resize(full, size, interpolation=cv2.INTER_AREA).astype(np.uint8)
+
+
+def beside(parse: Parse, folder: Path) -> Picture:
+    """Return a parse over its picture where the folder holds that very file, else by itself."""
+    path = folder / parse.image.name
+    if not path.is_file():
+        return parse_view(parse)
+    return overlay(decoded(path.read_bytes(), str(path)), parse)

@@ -1,0 +1,171 @@
+"""The pixel classifier: what it is made of, how it is applied and kept (npz without pickles)."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..artifacts.store import unreadable
+from ..errors import InvalidInput
+from ..imaging.features import Picture
+from ..imaging.features_context import Probabilities
+from ..imaging.image_io import fitted
+from .autocontext import run_stages
+from .patches import patch_codes, patch_tests
+from .trees import Trees
+
+FORMAT = "facade-tools/classifier/1"
+MAX_BYTES = 256 << 20
+MAX_NODES = 20_000_000
+MAX_CLASSES = 100
+MAX_PIXELS = 160_000  # at working resolution
+KINDS = ("context", "patch")
+
+_ARRAYS = {
+    "feature": (np.int16, 1), "threshold": (np.uint8, 1), "child": (np.int32, 1),
+    "value": (np.float16, 2), "root": (np.int32, 1), "depth": (np.int16, 1),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Classifier:
+    """Stages of trees over pixel features.
+
+    kind: `context` (features of the picture, then of the beliefs too) or `patch` (the paper's
+    forest). height: rows of the working resolution. patch: side of the patches. about: free notes.
+    """
+
+    kind: str
+    classes: tuple[str, ...]
+    stages: tuple[Trees, ...]
+    height: int
+    patch: int = 0
+    about: str = ""
+
+    def working(self, picture: Picture) -> Picture:
+        """Return a picture at the resolution that the classifier works at."""
+        return fitted(picture, self.height, MAX_PIXELS)
+
+    def probabilities(self, working: Picture) -> Probabilities:
+        """Return class probabilities (classes, height, width) of a picture at working size."""
+        if self.kind == "context":
+            return run_stages(self.stages, working)
+        codes = patch_codes(working, patch_tests(self.patch))
+        shares = self.stages[0].scores(codes)
+        shares /= np.maximum(shares.sum(axis=1, keepdims=True), np.float32(1e-9))
+        return np.ascontiguousarray(shares.T).reshape(-1, *working.shape[:2])
+
+
+def save(classifier: Classifier) -> bytes:
+    """Return the bytes of a classifier's file; the same classifier always gives the same."""
+    arrays: dict[str, NDArray[Any]] = {
+        "format": np.array(FORMAT),
+        "kind": np.array(classifier.kind),
+        "classes": np.array(classifier.classes),
+        "height": np.array(classifier.height),
+        "patch": np.array(classifier.patch),
+        "about": np.array(classifier.about),
+    }
+    for number, trees in enumerate(classifier.stages):
+        for name, (kind, _) in _ARRAYS.items():
+            arrays[f"{name}{number}"] = getattr(trees, name).astype(kind)
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
+        for name, array in arrays.items():
+            body = io.BytesIO()
+            np.lib.format.write_array(body, array, allow_pickle=False)
+            archive.writestr(zipfile.ZipInfo(f"{name}.npy", (1980, 1, 1, 0, 0, 0)), body.getvalue(),
+                             zipfile.ZIP_DEFLATED)  # fmt: skip
+    return out.getvalue()
+
+
+def load(path: str) -> Classifier:
+    """Return the classifier of a file. Raises InvalidInput on what is none."""
+    try:
+        data = Path(path).read_bytes() if Path(path).stat().st_size <= MAX_BYTES else None
+    except OSError as error:
+        raise unreadable(path, error) from None
+    if data is None:
+        raise InvalidInput(f"is larger than {MAX_BYTES >> 20} MiB; expected a classifier").at(path)
+    try:
+        return decoded(data)
+    except InvalidInput as error:
+        raise error.at(path) from None
+
+
+def default() -> Classifier:
+    """Return the classifier that ships with the tool, trained on rendered facades only."""
+    path = resources.files("facade_tools.segmentation").joinpath("default.npz")
+    return decoded(path.read_bytes())
+
+
+def decoded(data: bytes) -> Classifier:
+    """Return the classifier of a file's bytes, every array checked."""
+    arrays = _arrays(data)
+    try:
+        if str(arrays["format"]) != FORMAT:
+            raise InvalidInput(f"is {str(arrays['format'])[:40]!r}; expected {FORMAT}")
+        kind, height, patch = str(arrays["kind"]), int(arrays["height"]), int(arrays["patch"])
+        classes = tuple(str(name) for name in np.atleast_1d(arrays["classes"]))
+        about = str(arrays["about"])
+        count = sum(name.startswith("feature") for name in arrays)
+        stages = tuple(_stage(arrays, i, len(classes)) for i in range(count))
+    except KeyError as error:
+        raise InvalidInput(f"has no array {error}; expected a classifier") from None
+    except (TypeError, ValueError):
+        raise InvalidInput("holds arrays of other types; expected a classifier") from None
+    if kind not in KINDS or not stages or not 1 < len(classes) <= MAX_CLASSES:
+        raise InvalidInput("is no classifier of a known kind")
+    if not 16 <= height <= 4096 or not (0 <= patch <= 101):
+        raise InvalidInput("has a working resolution out of range")
+    return Classifier(kind, classes, stages, height, patch, about)
+
+
+def _arrays(data: bytes) -> dict[str, NDArray[Any]]:
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            if sum(entry.file_size for entry in archive.infolist()) > MAX_BYTES:
+                raise InvalidInput(f"unpacks to more than {MAX_BYTES >> 20} MiB")
+        with np.load(io.BytesIO(data), allow_pickle=False) as loaded:
+            return {name: loaded[name] for name in loaded.files}
+    except (zipfile.BadZipFile, OSError, ValueError, EOFError, AttributeError):
+        raise InvalidInput("is no npz archive of plain arrays; expected a classifier") from None
+
+
+def _stage(arrays: Mapping[str, NDArray[Any]], number: int, classes: int) -> Trees:
+    parts: dict[str, NDArray[Any]] = {}
+    for name, (kind, dimensions) in _ARRAYS.items():
+        array = arrays[f"{name}{number}"]
+        if array.dtype != kind or array.ndim != dimensions or len(array) > MAX_NODES:
+            raise InvalidInput(f"array {name}{number} has another type or shape")
+        parts[name] = array
+    _check(parts, number, classes)
+    parts["value"] = parts["value"].astype(np.float32)
+    return Trees(**parts, classes=classes)
+
+
+def _check(parts: Mapping[str, NDArray[Any]], number: int, classes: int) -> None:
+    """Refuse arrays whose indices lead out of them: the compiled loop does not look."""
+    count = len(parts["feature"])
+    lengths = {len(parts[name]) for name in ("feature", "threshold", "child", "value")}
+    inside = count > 0 and lengths == {count} and len(parts["root"]) == len(parts["depth"]) > 0
+    if not inside or parts["value"].shape[1] not in (1, classes):
+        raise InvalidInput(f"arrays of stage {number} have different lengths")
+    child, leaf = parts["child"], parts["child"] == np.arange(count)
+    top = np.where(leaf, child, child + 1)
+    bad = child.min() < 0 or top.max() >= count or (parts["threshold"][leaf] != 255).any()
+    roots = parts["root"]
+    if bad or roots.min() < 0 or roots.max() >= count or parts["feature"].min() < 0:
+        raise InvalidInput(f"indices of stage {number} lead out of its arrays")
+    if parts["depth"].min() < 0 or parts["depth"].max() > 64:
+        raise InvalidInput(f"depths of stage {number} are out of range")
+    if not np.isfinite(parts["value"]).all():
+        raise InvalidInput(f"values of stage {number} are not finite")

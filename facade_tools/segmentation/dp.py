@@ -1,0 +1,199 @@
+"""Exact alternation: given the columns the best rows are a dynamic programme, and the reverse.
+
+TSKP10 searches the derivations of a factorised grammar by a random walk. Here each half-step is
+exact, so that the energy never rises; it ends where neither half can improve.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import Infeasible
+from ..grammar.plan import Plan
+from ..grammar.segments import Cut, best_cut, chain, moves
+from .energy import (
+    Field,
+    Layout,
+    column_costs,
+    column_limits,
+    column_prior,
+    energy,
+    row_limits,
+    state_costs,
+)
+
+STARTS = (0.0, 0.1, 0.3, 0.6)
+MAX_ROUNDS = 30
+GAIN = 1e-6  # nats: less is no improvement
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """The best layout found, its energy, the energies on the way, and a bound from below."""
+
+    layout: Layout
+    energy: float
+    trace: tuple[float, ...]
+    bound: float
+
+    @property
+    def optimal(self) -> bool:
+        """Whether the bound proves that nothing is better."""
+        return self.energy <= self.bound + GAIN
+
+
+def solve(field: Field, plan: Plan) -> Solution:
+    """Return the best of several alternations. Raises Infeasible where no facade of the grammar fits.
+
+    A grammar whose floors derive each for itself starts from the best with common columns.
+    """
+    relaxed = _relaxed(field, plan)
+    bound = _solve_rows(field, plan, relaxed[0]).cost
+    best: Layout | None = None
+    reached = np.inf
+    trace: list[float] = []
+    seen: set[tuple[int, ...]] = set()
+    for mix in STARTS:
+        rows = _solve_rows(field, plan, (1 - mix) * relaxed[0] + mix * relaxed[1])
+        key = (*rows.states, *rows.bounds)
+        if key in seen:
+            continue
+        seen.add(key)
+        layout, path = _alternate(field, plan, rows)
+        if path[-1] < reached - GAIN:
+            best, reached = layout, path[-1]
+        trace.append(path[-1])
+    assert best is not None
+    if plan.per_floor:
+        best, path = _unfactored(field, plan, best)
+        trace += path
+        reached = path[-1]
+    return Solution(best, energy(field, plan, best), tuple(trace), bound)
+
+
+def _relaxed(field: Field, plan: Plan) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return (states, height) costs of rows whose pixels choose their kind freely, and of the mean.
+
+    The first bounds every layout from below: the columns are forgotten.
+    """
+    free, mean = [], []
+    for state in plan.states:
+        planes = sorted({field.label[label] for label in state.labels})
+        table = field.cost[planes]
+        free.append(table.min(axis=0).sum(axis=1))
+        mean.append(table.mean(axis=0).sum(axis=1))
+    return np.array(free), np.array(mean)
+
+
+def _solve_rows(field: Field, plan: Plan, costs: NDArray[np.float64]) -> Cut:
+    every = range(len(plan.states))
+    cut = best_cut(costs, moves(plan.rows), row_limits(plan, field, every))
+    if cut is None:
+        raise Infeasible("no facade of the grammar is as small as the picture")
+    return cut
+
+
+def _solve_columns(field: Field, plan: Plan, rows: list[tuple[int, int, int]]) -> Cut:
+    group = plan.states[rows[0][0]].group
+    assert group is not None
+    machine = moves(plan.groups[group].automaton)
+    cut = best_cut(column_costs(field, plan, rows), machine, column_limits(plan, field, group))
+    if cut is None:
+        raise Infeasible("no row of the grammar is as narrow as the picture")
+    return cut
+
+
+def _segments(rows: Cut) -> list[tuple[int, int, int]]:
+    return list(zip(rows.states, rows.bounds, rows.bounds[1:], strict=False))
+
+
+def _alternate(field: Field, plan: Plan, rows: Cut) -> tuple[Layout, list[float]]:
+    """Improve rows and common columns in turn."""
+    columns: dict[int, Cut] = {}
+    path: list[float] = []
+    for _ in range(MAX_ROUNDS):
+        for group in range(len(plan.groups)):
+            own = [row for row in _segments(rows) if plan.states[row[0]].group == group]
+            every = [
+                (s, 0, field.shape[0])
+                for s, state in enumerate(plan.states)
+                if state.group == group
+            ]
+            if own or group not in columns:
+                columns[group] = _solve_columns(field, plan, own or every)
+        groups = [state.group for state in plan.states]
+        sets = [None if group is None else columns[group] for group in groups]
+        rows = _solve_rows(field, plan, state_costs(field, plan, range(len(groups)), sets))
+        owner = tuple(-1 if (group := groups[s]) is None else group for s in rows.states)
+        layout = Layout(rows, tuple(columns[g] for g in range(len(plan.groups))), owner)
+        path.append(rows.cost + _priors(field, plan, layout))
+        if len(path) > 1 and path[-1] > path[-2] - GAIN:
+            break
+    return layout, path
+
+
+def _priors(field: Field, plan: Plan, layout: Layout) -> float:
+    """Return the priors of the columns that rows use."""
+    groups = {
+        o: plan.states[s].group for s, o in zip(layout.rows.states, layout.owner, strict=True)
+    }
+    used = [o for o in groups if o >= 0]
+    return sum(column_prior(plan, field, groups[o], layout.columns[o]) for o in used)
+
+
+def owners(plan: Plan, rows: Cut) -> tuple[int, ...]:
+    """Return the set of columns of each row: one a group, or one an instance where `each` says so."""
+    out: list[int] = []
+    known: dict[int, int] = {}
+    count = 0
+    previous = -1
+    for number in rows.states:
+        group = plan.states[number].group
+        if group is None:
+            out.append(-1)
+        elif plan.groups[group].each:
+            same = previous >= 0 and _same_instance(plan, previous, number)
+            count += not same
+            out.append(count - 1)
+        else:
+            if group not in known:
+                known[group] = count
+                count += 1
+            out.append(known[group])
+        previous = number
+    return tuple(out)
+
+
+def _same_instance(plan: Plan, before: int, after: int) -> bool:
+    shared = plan.rows.follow[before].get(after, -1)
+    own = plan.states[after].path
+    return plan.states[before].path == own and shared == len(own)
+
+
+def _unfactored(field: Field, plan: Plan, layout: Layout) -> tuple[Layout, list[float]]:
+    """Give floors their own columns and alternate with the sequence of rows kept."""
+    rows = layout.rows
+    owner = owners(plan, rows)
+    path: list[float] = []
+    limits = row_limits(plan, field, rows.states)
+    for _ in range(MAX_ROUNDS):
+        segments = _segments(rows)
+        columns = tuple(
+            _solve_columns(
+                field, plan, [s for s, o in zip(segments, owner, strict=True) if o == own]
+            )
+            for own in range(max(owner) + 1)
+        )
+        sets = [None if own < 0 else columns[own] for own in owner]
+        costs = state_costs(field, plan, rows.states, sets)
+        cut = best_cut(costs, chain(len(rows.states)), limits)
+        assert cut is not None  # the old bounds are a solution
+        rows = Cut(rows.states, cut.bounds, cut.cost)
+        layout = Layout(rows, columns, owner)
+        path.append(cut.cost + _priors(field, plan, layout))
+        if len(path) > 1 and path[-1] > path[-2] - GAIN:
+            break
+    return layout, path

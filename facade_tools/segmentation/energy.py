@@ -1,0 +1,154 @@
+"""Costs of a probability map under a plan, and the exact sums that the solvers need.
+
+Rows are counted from the bottom here, as grammars are written; `costs` turns the picture over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InvalidInput
+from ..grammar.plan import Plan
+from ..grammar.segments import Bounds, Cut, bounds, size_cost
+
+LEAST_PROBABILITY = 1e-4
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """Pixel costs, −ln max(p, 1e-4), and their running sums in both directions.
+
+    cost: (labels, height, width), row 0 is the bottom. across, up: running sums along x and y,
+    one longer. label: index of each label's plane.
+    """
+
+    cost: NDArray[np.float64]
+    across: NDArray[np.float64]
+    up: NDArray[np.float64]
+    label: dict[str, int]
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width."""
+        return self.cost.shape[1], self.cost.shape[2]
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """A derivation as cuttings: rows from the bottom, columns of each set, set of each row.
+
+    owner[i] is the set of columns of row segment i, −1 for a terminal's row.
+    """
+
+    rows: Cut
+    columns: tuple[Cut, ...]
+    owner: tuple[int, ...]
+
+
+def field_of(probabilities: NDArray[np.float32], classes: Sequence[str], plan: Plan) -> Field:
+    """Return the costs of class probabilities (classes, height, width), top row first.
+
+    Raises InvalidInput where the grammar uses a label that the classifier does not know.
+    """
+    for label in plan.labels:
+        if label not in classes:
+            known = ", ".join(classes)
+            raise InvalidInput(f"label {label!r} is unknown to the classifier ({known})")
+    planes = probabilities[[classes.index(label) for label in plan.labels], ::-1]
+    cost = -np.log(np.maximum(planes.astype(np.float64), LEAST_PROBABILITY))
+    across = np.zeros((*cost.shape[:2], cost.shape[2] + 1))
+    np.cumsum(cost, axis=2, out=across[:, :, 1:])
+    up = np.zeros((cost.shape[0], cost.shape[1] + 1, cost.shape[2]))
+    np.cumsum(cost, axis=1, out=up[:, 1:])
+    return Field(cost, across, up, {label: i for i, label in enumerate(plan.labels)})
+
+
+def row_costs(field: Field, columns: Cut, kinds: int) -> NDArray[np.float64]:
+    """Return (labels, height, kinds): cost of a row's pixels in the columns of each kind."""
+    at = np.asarray(columns.bounds)
+    parts = field.across[:, :, at[1:]] - field.across[:, :, at[:-1]]
+    member = np.zeros((len(columns.states), kinds))
+    member[np.arange(len(columns.states)), columns.states] = 1.0
+    sums: NDArray[np.float64] = parts @ member
+    return sums
+
+
+def state_costs(
+    field: Field, plan: Plan, states: Sequence[int], columns: Sequence[Cut | None]
+) -> NDArray[np.float64]:
+    """Return (states, height): cost of each row under each state; columns[i] are state i's."""
+    height = field.shape[0]
+    out = np.empty((len(states), height))
+    sums: dict[int, NDArray[np.float64]] = {}
+    for i, (number, cut) in enumerate(zip(states, columns, strict=True)):
+        state = plan.states[number]
+        planes = [field.label[label] for label in state.labels]
+        if cut is None:
+            out[i] = field.across[planes[0], :, -1]
+            continue
+        if id(cut) not in sums:
+            sums[id(cut)] = row_costs(field, cut, len(planes))
+        table = sums[id(cut)]
+        out[i] = table[planes, :, np.arange(len(planes))].sum(axis=0)
+    return out
+
+
+def column_costs(
+    field: Field, plan: Plan, rows: Sequence[tuple[int, int, int]]
+) -> NDArray[np.float64]:
+    """Return (kinds, width): cost of each column under each kind; rows are (state, from, to)."""
+    kinds = len(plan.states[rows[0][0]].labels)
+    out = np.zeros((kinds, field.shape[1]))
+    for number, low, high in rows:
+        planes = [field.label[label] for label in plan.states[number].labels]
+        used = sorted(set(planes))
+        band = dict(zip(used, field.up[used, high] - field.up[used, low], strict=True))
+        for kind, plane in enumerate(planes):
+            out[kind] += band[plane]
+    return out
+
+
+def row_limits(plan: Plan, field: Field, states: Sequence[int]) -> Bounds:
+    """Return the bounds of rows of the given states, in pixels."""
+    height = field.shape[0]
+    return bounds(tuple(plan.states[s].size for s in states), height, height)
+
+
+def column_limits(plan: Plan, field: Field, group: int) -> Bounds:
+    """Return the bounds of a group's columns, in pixels."""
+    height, width = field.shape
+    return bounds(plan.groups[group].sizes, height, width)
+
+
+def energy(field: Field, plan: Plan, layout: Layout) -> float:
+    """Return −Σ ln p over the layout's pixels plus the priors of sizes, summed directly."""
+    total = 0.0
+    used: set[int] = set()
+    limits = row_limits(plan, field, layout.rows.states)
+    for i, number in enumerate(layout.rows.states):
+        low, high = layout.rows.bounds[i], layout.rows.bounds[i + 1]
+        total += size_cost(limits, i, high - low)
+        labels = plan.states[number].labels
+        if layout.owner[i] < 0:
+            total += float(field.cost[field.label[labels[0]], low:high].sum())
+            continue
+        cut = layout.columns[layout.owner[i]]
+        for kind, left, right in zip(cut.states, cut.bounds, cut.bounds[1:], strict=False):
+            total += float(field.cost[field.label[labels[kind]], low:high, left:right].sum())
+        if layout.owner[i] not in used:
+            used.add(layout.owner[i])
+            total += column_prior(plan, field, plan.states[number].group, cut)
+    return total
+
+
+def column_prior(plan: Plan, field: Field, group: int | None, cut: Cut) -> float:
+    """Return the prior energy of the widths of one set of columns."""
+    if group is None:
+        return 0.0
+    limits = column_limits(plan, field, group)
+    widths = np.diff(cut.bounds)
+    return sum(size_cost(limits, k, int(w)) for k, w in zip(cut.states, widths, strict=True))

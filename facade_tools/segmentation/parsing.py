@@ -1,0 +1,144 @@
+"""A photograph to its parse: beliefs of pixels, search of the grammar, regions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..artifacts.parse import LABELS, ImageInfo, Parse
+from ..errors import InvalidInput
+from ..grammar.derivation import painted
+from ..grammar.library import DEFAULT
+from ..grammar.library import load as load_grammar
+from ..grammar.plan import Plan
+from ..grammar.plan import plan as make_plan
+from ..grammar.reading import Method, Reading, ReadOptions, label_index
+from ..imaging.features_context import Probabilities
+from ..imaging.image_io import Photo
+from . import dp
+from .classifier import Classifier, default
+from .classifier import load as load_classifier
+from .deriving import Frame, derivation, floors_of, regions_of, with_confidence
+from .energy import Field, field_of
+
+IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+@dataclass(frozen=True, slots=True)
+class Reader:
+    """Everything that reading a picture needs, the same for all pictures."""
+
+    classifier: Classifier
+    plan: Plan
+    solver: str = "dp"
+    name: str = "default"
+
+
+Solver = Callable[[Field, Plan, np.random.Generator], dp.Solution]
+
+SOLVERS: Mapping[str, Solver] = {
+    "dp": lambda field, plan, _: dp.solve(field, plan),
+}
+
+
+def forest_method(options: ReadOptions) -> Method:
+    """Return the method of TSKP10: trees believe, a grammar explains."""
+    classifier = default() if options.classifier is None else load_classifier(options.classifier)
+    name = "default" if options.classifier is None else Path(options.classifier).name
+    plan = compiled_plan(options.grammar or DEFAULT)
+    return partial(read_facade, Reader(classifier, plan, options.solver, name))
+
+
+def compiled_plan(name: str) -> Plan:
+    """Return the plan of a shipped grammar or of a grammar's file."""
+    try:
+        return make_plan(load_grammar(name))
+    except InvalidInput as error:
+        raise error.at(name) from None
+
+
+def read_facade(
+    reader: Reader,
+    photo: Photo,
+    identity: str,
+    *,
+    rng: np.random.Generator,
+    mask: NDArray[np.bool_] | None = None,
+) -> Reading:
+    """Return the parse of a rectified photograph.
+
+    mask: (height, width), true where an occluder hides the facade; there every label is as good.
+    Raises Infeasible where the picture is too small for the grammar.
+    """
+    working = reader.classifier.working(photo.pixels)
+    belief = reader.classifier.probabilities(working)
+    shape = photo.pixels.shape[:2]
+    raw = raw_labels(belief, reader.classifier.classes, shape)
+    if mask is not None:
+        belief = _blinded(belief, mask, shape)
+    field = field_of(belief, reader.classifier.classes, reader.plan)
+    solution = SOLVERS[reader.solver](field, reader.plan, rng)
+    frame = Frame(working.shape[:2], shape)
+    tree = derivation(reader.plan, solution.layout, frame)
+    planes = dict(zip(reader.classifier.classes, belief, strict=True))
+    regions = with_confidence(regions_of(tree), planes, frame)
+    floors = floors_of(tree)
+    parse = Parse(
+        id=identity,
+        image=ImageInfo(photo.name, (shape[1], shape[0]), photo.sha256),
+        rectification=IDENTITY,
+        method="forest",
+        solver=reader.solver,
+        grammar=reader.plan.grammar.id,
+        classifier=reader.name,
+        energy=solution.energy,
+        working=(working.shape[1], working.shape[0]),
+        regions=regions,
+        floors=floors,
+        columns=max((floor.columns for floor in floors), key=len, default=()),
+        bound=solution.bound,
+        optimal=solution.optimal,
+        trace=solution.trace,
+        derivation=tree,
+    )
+    return Reading(parse, painted(tree, shape, label_index()), raw)
+
+
+def raw_labels(
+    belief: Probabilities, classes: tuple[str, ...], shape: tuple[int, int]
+) -> NDArray[np.uint8]:
+    """Return the label map of the likeliest classes in a picture of `shape`, beliefs interpolated."""
+    index = np.array([_index(name) for name in classes], np.uint8)
+    size = (shape[1], shape[0])
+    best = np.full(shape, -1.0, np.float32)
+    out = np.zeros(shape, np.uint8)
+    for name, plane in zip(index, belief, strict=True):
+        larger = cv2.resize(plane, size, interpolation=cv2.INTER_LINEAR)
+        better = larger > best
+        best[better] = larger[better]
+        out[better] = name
+    return out
+
+
+def _index(name: str) -> int:
+    if name not in LABELS:
+        raise InvalidInput(f"class {name!r} is no label of parses ({', '.join(LABELS[1:])})")
+    return LABELS.index(name)
+
+
+def _blinded(
+    belief: Probabilities, mask: NDArray[np.bool_], shape: tuple[int, int]
+) -> Probabilities:
+    if mask.shape != shape:
+        raise InvalidInput(
+            f"the mask has {mask.shape[1]}×{mask.shape[0]} pixels, the picture other"
+        )
+    height, width = belief.shape[1:]
+    area = cv2.resize(mask.astype(np.float32), (width, height), interpolation=cv2.INTER_AREA)
+    return np.where(area > 0.5, np.float32(1.0), belief).astype(np.float32)

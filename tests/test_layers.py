@@ -18,6 +18,7 @@ LAYERS = {
     "cli": 5,
 }  # fmt: skip
 SIBLINGS_ALLOWED = 3  # formats, imaging and grammar may use one another
+RANDOM_ALLOWED = {"np.random.Generator", "np.random.PCG64", "np.random.default_rng"}
 
 
 def modules():

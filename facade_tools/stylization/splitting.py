@@ -1,0 +1,189 @@
+"""Splitting rules: found in a variance signal, applied to faces of any size (LNSW13 4.3, 5.2)."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..geometry.arrays import Booleans, Floats
+
+SMOOTHNESS = 0.025  # λ of eq. 3
+
+
+@dataclass(frozen=True, slots=True)
+class SplitRule:
+    """Widths in metres: scalable a_1 … a_{m+1} around insertable b_1 … b_m (eq. 8)."""
+
+    scalable: tuple[float, ...]
+    insertable: tuple[float, ...] = ()
+
+    @property
+    def size(self) -> float:
+        """Σa + Σb, the size at which the rule was found (m)."""
+        return math.fsum(self.scalable) + math.fsum(self.insertable)
+
+
+@dataclass(frozen=True, slots=True)
+class Split:
+    """A face cut by a rule: its sections in order.
+
+    sources: index of the section in the rule (even: scalable, odd: insertable). sizes: metres,
+    summing to the face's. windows: S_n. stretch: S_r, the factor on scalable sections.
+    """
+
+    sources: tuple[int, ...]
+    sizes: tuple[float, ...]
+    windows: int
+    stretch: float
+
+
+def variance_signal(picture: NDArray[Any], axis: int) -> Floats:
+    """Return the variance of colour along `axis` for every place of the other one, maximum 1.
+
+    picture: (h, w, 3), colours in 0..1 or 8 bits. axis 0 gives one value a column (n = w). The
+    variance is the mean over the channels; a signal without variance is all zero (CONTRACT).
+    """
+    colours = np.asarray(picture, dtype=np.float64)
+    if np.asarray(picture).dtype == np.uint8:
+        colours = colours / 255
+    signal: Floats = colours.var(axis=axis).mean(axis=-1)
+    top = signal.max(initial=0.0)
+    return signal / top if top > 1e-12 else np.zeros_like(signal)
+
+
+def two_means(signal: Floats) -> tuple[float, float]:
+    """Return the two cluster centres (low, high) that split the sorted signal best.
+
+    In one dimension 2-means is solved exactly by trying every cut of the sorted values.
+    """
+    values = np.sort(signal)
+    count = np.arange(1, len(values))
+    sums, squares = np.cumsum(values), np.cumsum(values**2)
+    left = squares[:-1] - sums[:-1] ** 2 / count
+    rest = sums[-1] - sums[:-1]
+    right = squares[-1] - squares[:-1] - rest**2 / (len(values) - count)
+    cut = int(np.argmin(left + right)) + 1
+    return float(values[:cut].mean()), float(values[cut:].mean())
+
+
+def insertable_labels(signal: Floats, smoothness: float = SMOOTHNESS) -> Booleans:
+    """Label every place insertable (True) or scalable by the exact minimum of eq. 3 to 5.
+
+    signal: (n,) in 0..1. Returns (n,). Ties are scalable.
+    """
+    if len(signal) < 2 or signal.max() - signal.min() < 1e-9:
+        return np.zeros(len(signal), dtype=bool)
+    low, high = two_means(signal)
+    cost = np.stack([np.abs(signal - low), np.abs(signal - high)])
+    return _least_path(cost, smoothness)
+
+
+def _least_path(cost: Floats, smoothness: float) -> Booleans:
+    """Return the labels of least Σ cost[label_i, i] + smoothness·(number of changes)."""
+    n = cost.shape[1]
+    stays = np.empty((2, n), dtype=bool)
+    total = cost[:, 0].copy()
+    for i in range(1, n):
+        change = total[::-1] + smoothness
+        stays[:, i] = total <= change
+        total = np.minimum(total, change) + cost[:, i]
+    labels = np.empty(n, dtype=bool)
+    state = int(total[1] < total[0])
+    for i in range(n - 1, -1, -1):
+        labels[i] = bool(state)
+        if i and not stays[state, i]:
+            state = 1 - state
+    return labels
+
+
+def merged(labels: Booleans, least: float) -> Booleans:
+    """Drop insertable runs shorter than half of `least` places: fragments of a window, or noise.
+
+    A gap shorter than that between two insertable runs is closed first, so that a window with a
+    mullion stays one window.
+    """
+    out = labels.copy()
+    for value in (False, True):
+        for start, end in _runs(out, value):
+            inside = value or (start > 0 and end < len(out))
+            if end - start < least / 2 and inside:
+                out[start:end] = not value
+    return out
+
+
+def _runs(labels: Booleans, value: bool) -> list[tuple[int, int]]:
+    padded = np.concatenate([[False], labels == value, [False]])
+    edges = np.flatnonzero(padded[1:] != padded[:-1])
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def rule_of(labels: Booleans, size: float) -> SplitRule:
+    """Return the rule of labelled places that together measure `size` metres."""
+    place = size / max(len(labels), 1)
+    windows = _runs(labels, True)
+    borders = [0, *(edge for run in windows for edge in run), len(labels)]
+    widths = [place * (b - a) for a, b in itertools.pairwise(borders)]
+    return SplitRule(tuple(widths[::2]), tuple(widths[1::2]))
+
+
+def split(rule: SplitRule, size: float) -> Split:
+    """Cut a face of `size` metres: repeat insertable sections, scale the others (eq. 8 and 9).
+
+    Eq. 8 packs as many windows as fit. Where the scalable sections would be squeezed to less
+    than half, the number of windows whose |log S_r| is least is taken instead.
+    """
+    if not rule.insertable:
+        return Split((0,), (size,), 0, size / rule.size)
+    packed = _count(rule, size)
+    chosen = _arranged(rule, size, packed)
+    if chosen.stretch >= 0.5:
+        return chosen
+    options = (_arranged(rule, size, count) for count in range(packed, -1, -1))
+    return min(options, key=lambda option: abs(math.log(max(option.stretch, 1e-9))))
+
+
+def _count(rule: SplitRule, size: float) -> int:
+    """Return S_n = x·m + y of eq. 8."""
+    m = len(rule.insertable)
+    x = math.floor(size / rule.size + 1e-9)
+    rest = size - x * rule.size
+    y = 0
+    for width in rule.insertable:
+        rest -= width
+        if rest < -1e-9:
+            break
+        y += 1
+    return x * m + y
+
+
+def _arranged(rule: SplitRule, size: float, windows: int) -> Split:
+    sources = _sequence(rule, windows)
+    fixed = math.fsum(rule.insertable[i // 2] for i in sources if i % 2)
+    flexible = math.fsum(rule.scalable[i // 2] for i in sources if not i % 2)
+    if flexible <= 1e-9:  # no wall between the windows: they take the stretch
+        factor = size / fixed if fixed > 0 else 1.0
+        return Split(sources, tuple(factor * _width(rule, i) for i in sources), windows, factor)
+    stretch = (size - fixed) / flexible
+    sizes = tuple(_width(rule, i) * (1.0 if i % 2 else stretch) for i in sources)
+    return Split(sources, sizes, windows, stretch)
+
+
+def _sequence(rule: SplitRule, windows: int) -> tuple[int, ...]:
+    """Return x whole repeats of the rule and its first y windows, each between two walls.
+
+    Between the last wall of a repeat and the first of the next both stay (eq. 9 counts both).
+    """
+    m = len(rule.insertable)
+    x, y = divmod(windows, m)
+    whole = list(range(2 * m + 1))
+    tail = list(range(2 * y + 1)) if y or not x else []
+    return tuple(whole * x + tail)
+
+
+def _width(rule: SplitRule, index: int) -> float:
+    return rule.insertable[index // 2] if index % 2 else rule.scalable[index // 2]

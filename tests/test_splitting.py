@@ -1,0 +1,109 @@
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from facade_tools.stylization.splitting import (
+    SplitRule,
+    insertable_labels,
+    merged,
+    rule_of,
+    split,
+    two_means,
+    variance_signal,
+)
+
+signals = st.lists(st.floats(0, 1), min_size=2, max_size=9).map(np.array)
+widths = st.floats(0.2, 4)
+rules = st.integers(0, 4).flatmap(
+    lambda m: st.builds(
+        SplitRule,
+        st.tuples(*[widths] * (m + 1)),
+        st.tuples(*[widths] * m),
+    )
+)
+
+
+def energy(signal, labels, centres, smoothness):
+    data = sum(abs(v - centres[int(label)]) for v, label in zip(signal, labels, strict=True))
+    return data + smoothness * sum(a != b for a, b in itertools.pairwise(labels))
+
+
+@given(signals, st.floats(0, 0.5))
+def test_labels_are_the_exact_minimum(signal, smoothness):
+    labels = insertable_labels(signal, smoothness)
+    if signal.max() - signal.min() < 1e-9:
+        assert not labels.any()
+        return
+    centres = two_means(signal)
+    everything = itertools.product([False, True], repeat=len(signal))
+    least = min(energy(signal, option, centres, smoothness) for option in everything)
+    assert energy(signal, labels, centres, smoothness) == pytest.approx(least, abs=1e-12)
+
+
+@given(signals)
+def test_two_means_is_the_best_cut(signal):
+    low, high = two_means(signal)
+    assert low <= high
+    cost = np.minimum((signal - low) ** 2, (signal - high) ** 2).sum()
+    values = np.sort(signal)
+    cuts = (
+        values[:k].var() * k + values[k:].var() * (len(values) - k) for k in range(1, len(values))
+    )
+    assert cost <= min(cuts) + 1e-9
+
+
+def test_windows_show_in_the_signal():
+    picture = np.full((40, 60, 3), 180, dtype=np.uint8)
+    for x in (10, 30, 45):
+        picture[10:30, x : x + 8] = 20
+    signal = variance_signal(picture, 0)
+    assert signal.max() == 1
+    rule = rule_of(insertable_labels(signal), 6.0)
+    assert rule.insertable == pytest.approx((0.8, 0.8, 0.8))
+    assert rule.scalable == pytest.approx((1.0, 1.2, 0.7, 0.7))
+    assert len(rule_of(insertable_labels(variance_signal(picture, 1)), 4.0).insertable) == 1
+    flat = np.full((5, 5, 3), 7, dtype=np.uint8)
+    assert not variance_signal(flat, 0).any()
+
+
+def test_fragments_are_merged():
+    labels = np.array([0, 0, 1, 1, 1, 0, 1, 1, 1, 0, 0, 0, 0, 1, 0, 0, 0], dtype=bool)
+    assert merged(labels, 6).astype(int).tolist() == [0, 0] + [1] * 7 + [0] * 8
+
+
+@given(rules)
+def test_a_face_of_its_own_size_is_unchanged(rule):
+    done = split(rule, rule.size)
+    assert done.sources == tuple(range(2 * len(rule.insertable) + 1))
+    assert done.stretch == pytest.approx(1)
+    assert done.windows == len(rule.insertable)
+
+
+@given(rules, st.floats(0.05, 60))
+def test_a_split_fills_the_face_and_never_stretches_windows(rule, size):
+    done = split(rule, size)
+    assert math.fsum(done.sizes) == pytest.approx(size)
+    assert min(done.sizes) >= -1e-9
+    for source, width in zip(done.sources, done.sizes, strict=True):
+        if source % 2:
+            assert width == pytest.approx(rule.insertable[source // 2])
+    assert done.windows == sum(source % 2 for source in done.sources)
+    assert done.sources[0] % 2 == 0
+    assert done.sources[-1] % 2 == 0
+
+
+def test_equation_8_and_9_by_hand():
+    rule = SplitRule((1.0, 1.0, 1.0), (2.0, 2.0))  # 7 m, two windows
+    done = split(rule, 10.0)  # one repeat, one window more: walls 1·3 + 1 + 1 scaled by 4/5
+    assert (done.windows, done.stretch) == (3, pytest.approx(0.8))
+    assert done.sources == (0, 1, 2, 3, 4, 0, 1, 2)
+    assert split(rule, 14.0).windows == 4
+    assert split(rule, 1.0).windows == 0
+    crowded = split(rule, 4.1)  # both windows fit, but with 3 cm of wall: one is nearer to 1
+    assert crowded.windows == 1

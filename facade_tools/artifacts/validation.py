@@ -37,11 +37,18 @@ def schema(name: str) -> dict[str, Any]:
 def check(document: Any, kind: str) -> None:
     """Raise InvalidInput, with the JSON pointer, where `document` breaks the schema of `kind`."""
     validator = _validator(kind)
-    if validator.is_valid(document):
+    if _is_valid(validator, document):
         return
-    document = plain(document)  # the compiled validator knows no subclass of float
+    document = plain(document)
     if not validator.is_valid(document):
         raise _explain(document, kind)
+
+
+def _is_valid(validator: jsonschema_rs.Draft202012Validator, document: Any) -> bool:
+    try:
+        return validator.is_valid(document)
+    except ValueError:  # the compiled validator knows no subclass of float
+        return False
 
 
 @cache

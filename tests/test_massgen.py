@@ -1,0 +1,260 @@
+"""Mass generation: exactness, validity, completion, candidates, roofs, the command."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from facade_tools.artifacts.attributes import Attributes, MassAttributes, Present
+from facade_tools.artifacts.building import Box, Building, Roof
+from facade_tools.artifacts.documents import decode, encode
+from facade_tools.errors import Infeasible
+from facade_tools.exteriors.annealing import PLAIN, anneal
+from facade_tools.exteriors.attributes import (
+    attribute_vector,
+    attributes_of_vector,
+    building_attributes,
+)
+from facade_tools.exteriors.mass_candidates import mass_distance
+from facade_tools.exteriors.mass_energy import layout_energy, mass_energy, target_of
+from facade_tools.exteriors.mass_layout import new_layout, new_work
+from facade_tools.exteriors.mass_roofs import roof_height
+from facade_tools.exteriors.massgen import generate_mass
+from facade_tools.geometry.boxes import box_rectangles, shared_outline
+from facade_tools.geometry.floors import floor_rectangles
+from facade_tools.randomness import item_generator
+
+
+def box(name, x0, y0, x1, y1, height, kind="general", roof=None):
+    return Box(name, kind, (x0 + x1) / 2, (y0 + y1) / 2, x1 - x0, y1 - y0, height, roof)
+
+
+PLANS = {
+    "box": (box("a", 0, 0, 12, 8, 2.8),),
+    "ell": (box("a", 0, 0, 12, 8, 3), box("b", 0, 8, 5, 12, 3)),
+    "garage": (box("a", 0, 0, 10, 9, 5.6), box("g", 10, -1.5, 16, 5, 2.7, "garage")),
+    "porches": (
+        box("a", 0, 0, 11, 9, 5.9),
+        box("p", 3, -2, 8, 0, 2.5, "porch"),
+        box("q", 6, 9, 10, 12, 2.5, "porch"),
+    ),
+    "inner porch": (
+        box("a", 0, 0, 15.7, 8.6, 2.8),
+        box("b", 0, -2, 6, 5.2, 2.8),
+        box("g", 15.7, -1.2, 21.9, 5.4, 2.6, "garage"),
+        box("p", 6, -1.5, 9.1, 0, 2.4, "porch"),
+    ),
+    "three floors": (
+        box("a", 0, 0, 9, 11, 8.7),
+        box("b", 9, 2, 13, 9, 5.8),
+        box("c", 2, 11, 8, 14, 3),
+    ),
+}
+
+
+def targets(name, **bits):
+    attributes = building_attributes(Building(name, PLANS[name]))
+    roof = {"flat": 0, "gable": 1, "hip": 0} | bits.pop("roof", {})
+    special = {"chimney": 0, "tower": 0} | bits
+    return replace(attributes, element=replace(attributes.element, roof=roof, special=special))
+
+
+def made(attributes, seed=0, **options):
+    rng = item_generator(seed, "massgen", attributes.id)
+    return list(generate_mass(attributes, rng=rng, **options))
+
+
+def assert_sound(building):
+    """Rules that every generated mass keeps."""
+    assert decode(encode(building), "building") is not None
+    shares = mass_energy(building.boxes, target_of(building.targets))[1]
+    assert shares["topology"] == 0
+    for b in building.boxes:
+        assert min(b.width, b.depth) >= 0.5 - 1e-9
+        assert b.roof is not None
+        assert b.kind == "porch" or b.height > 0.5 * building.storey_height
+        if b.kind == "garage":
+            outline = shared_outline(box_rectangles([b])[0], floor_rectangles(building, 0))
+            assert outline > 0.5
+    assert any(b.kind == "general" for b in building.boxes)
+    assert len({b.id for b in building.boxes}) == len(building.boxes)
+
+
+# --- from scratch ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", PLANS)
+def test_attributes_are_met(name):
+    wanted = targets(name)
+    (building,) = made(wanted)
+    assert_sound(building)
+    assert building.energy.mass < 1e-5
+    assert building.energy.residuals == {}
+    found = attribute_vector(building_attributes(building))[:27]
+    want = attribute_vector(wanted)[:27]
+    np.testing.assert_allclose(found[:3], want[:3], atol=0.02)
+    np.testing.assert_allclose(found, want, atol=0.02)
+
+
+def test_energy_is_that_of_the_attributes_stage():
+    for name in PLANS:
+        (building,) = made(targets(name))
+        again = decode(json.loads(json.dumps(encode(building))), "building")
+        energy, _ = mass_energy(again.boxes, target_of(building.targets))
+        assert energy == pytest.approx(building.energy.mass, abs=1e-9)
+
+
+def test_same_seed_same_building_and_other_seed_other_building():
+    first, again = made(targets("garage")), made(targets("garage"))
+    assert first == again
+    several = {made(targets("inner porch"), seed=s)[0].boxes for s in range(4)}
+    assert len(several) > 1
+
+
+def test_unknown_attributes_leave_the_search_free():
+    (building,) = made(Attributes("nothing"))
+    assert_sound(building)
+    assert building.energy.mass < 1e-6
+    partly = Attributes("some", MassAttributes(bbox=(12.0, None, 5.6), bcr=0.8))
+    (building,) = made(partly)
+    assert building.energy.mass < 1e-6
+    present = Attributes("there", present=Present(garage=True, porch_front=True))
+    kinds = [b.kind for b in made(present)[0].boxes]
+    assert kinds.count("garage") == 1
+    assert kinds.count("porch") == 1
+
+
+def test_contradictions_are_reported_not_fatal(caplog):
+    vector = attribute_vector(targets("garage"))
+    vector[4] = 2.0  # no plan has a perimeter under 4 √area
+    (building,) = made(attributes_of_vector("odd", vector))
+    assert_sound(building)
+    assert "bdry" in building.energy.residuals
+    assert "odd: energy" in caplog.text
+    assert "bdry" in caplog.text
+    with pytest.raises(Infeasible, match=r"required at most 0\.001"):
+        made(attributes_of_vector("odd", vector), require=1e-3)
+
+
+def test_plain_annealing_from_nothing_reaches_the_threshold():
+    reached = []
+    for name in PLANS:
+        target, trace = target_of(targets(name)), np.zeros(20)
+        layout, work = new_layout(), new_work()
+        rng = np.random.default_rng(1)
+        energy = anneal(layout, target, PLAIN, rng, work, trace)
+        assert energy == pytest.approx(layout_energy(layout, target, work))
+        assert (np.diff(trace) <= 0).all()
+        reached.append(energy < 1e-3)
+    assert np.mean(reached) > 0.8
+
+
+# --- completion and candidates --------------------------------------------------------------------
+
+
+def partial(*boxes, complete=(), **rest):
+    return Building("known", boxes, partial=True, complete=complete, **rest)
+
+
+KNOWN = box("house", 20.12345678, 5, 30.5, 13.25, None, roof=Roof("hip", 27.5))
+
+
+def test_known_boxes_are_kept_exactly():
+    garage = box("g", 14.1, 5.2, 20.12345678, 11, 2.7, "garage", Roof("shed", 9.0))
+    keep = partial(KNOWN, garage, complete=("garage",), features=("chimney",))
+    (building,) = made(targets("garage"), keep=keep)
+    assert_sound(building)
+    assert building.boxes[0] == replace(KNOWN, height=building.boxes[0].height)
+    assert building.boxes[1] == garage
+    assert [b.kind for b in building.boxes].count("garage") == 1
+    assert building.features == ("chimney",)
+    assert building.chimneys
+
+
+def test_complete_mass_gets_heights_and_roofs_only():
+    wanted = targets("porches")
+    keep = partial(
+        replace(PLANS["porches"][0], height=None), complete=("mass", "porch"), facades={}
+    )
+    (building,) = made(wanted, keep=keep)
+    general = [b for b in building.boxes if b.kind == "general"]
+    assert len(general) == 1
+    assert general[0].height == pytest.approx(5.9, abs=0.02)
+
+
+def test_rest_is_built_around_what_is_known():
+    whole = PLANS["inner porch"]
+    keep = partial(whole[1], whole[2])
+    (building,) = made(targets("inner porch"), keep=keep)
+    assert_sound(building)
+    assert building.energy.mass < 1e-3
+    assert len(building.boxes) > 2
+
+
+def test_candidates_differ_and_are_ordered():
+    found = made(targets("inner porch"), candidates=5)
+    assert [b.id for b in found] == [f"inner porch-{k}" for k in range(1, 6)]
+    energies = [b.energy.mass for b in found]
+    assert energies == sorted(energies)
+    for i, a in enumerate(found):
+        assert_sound(a)
+        for b in found[:i]:
+            assert mass_distance(a.boxes, b.boxes) >= 0.02
+
+
+def test_distance_of_masses():
+    a = PLANS["box"]
+    assert mass_distance(a, a) == 0
+    assert mass_distance(a, (replace(a[0], x=100.0),)) == 1
+    assert mass_distance(a, (replace(a[0], height=5.6),)) == pytest.approx(0.5)
+
+
+# --- roofs ----------------------------------------------------------------------------------------
+
+
+def test_roof_bits_are_realised():
+    for bits in ({"gable": 1}, {"gable": 0, "hip": 1}, {"flat": 1, "gable": 0}, {"hip": 1}):
+        wanted = targets("ell", roof=bits)
+        (building,) = made(wanted)
+        assert building_attributes(building).element.roof == wanted.element.roof
+
+
+def test_chimney_passes_through_the_roof():
+    for name in PLANS:
+        (building,) = made(targets(name, chimney=1))
+        (chimney,) = building.chimneys
+        for dx in (-1, 1):
+            for dy in (-1, 1):
+                x = chimney.x + dx * chimney.width / 2
+                y = chimney.y + dy * chimney.depth / 2
+                inside = roof_height(building.boxes, x, y)
+                assert 0 < inside < chimney.top
+        assert building.features == ("chimney",)
+
+
+def test_tower_has_a_cone_on_the_highest_small_box():
+    for name in ("box", "three floors", "garage"):
+        (building,) = made(targets(name, tower=1))
+        (tower,) = [b for b in building.boxes if b.roof.style == "cone"]
+        assert building.features == ("tower",)
+        assert max(tower.width, tower.depth) <= 4.6
+        assert tower.height == max(b.height for b in building.boxes)
+        assert building.energy.mass < 1e-4
+
+
+# --- the command ----------------------------------------------------------------------------------
+
+
+def test_command_makes_buildings(facade, tmp_path):
+    rows = [json.dumps(encode(targets(name))) for name in ("box", "garage")]
+    stdin = "\n".join(rows).encode()
+    result = facade("massgen", "-", "--candidates", "2", stdin=stdin)
+    assert result.returncode == 0, result.stderr
+    buildings = [json.loads(line) for line in result.stdout.splitlines()]
+    assert [b["id"] for b in buildings][-2:] == ["garage-1", "garage-2"]
+    assert buildings[0]["provenance"]["options"] == {"candidates": 2, "require": None}
+    again = facade("massgen", "-", "--candidates", "2", "--jobs", "2", stdin=stdin)
+    assert again.stdout == result.stdout

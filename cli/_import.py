@@ -5,9 +5,13 @@ from __future__ import annotations
 import logging
 from collections import Counter
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
+from facade_tools.artifacts.documents import parse_yaml
+from facade_tools.artifacts.store import unreadable
 from facade_tools.errors import FacadeError, InvalidInput
+from facade_tools.formats.assessor import parse_columns
 from facade_tools.formats.importing import Importer, Written, items
 from facade_tools.formats.reading import ReadOptions
 from facade_tools.parallel import Outcome, map_ordered
@@ -35,6 +39,22 @@ def run_import(options: ReadOptions, stream: StreamOptions) -> None:
     tally.report()
     if tally.refused:
         raise InvalidInput(f"{tally.refused} bad items were skipped")
+
+
+def read_columns(path: str | None) -> dict[str, Any] | None:
+    """Return the column mapping of a YAML or JSON file; raises InvalidInput unless it is one."""
+    if path is None:
+        return None
+    try:
+        mapping = parse_yaml(Path(path).read_bytes())
+        if not isinstance(mapping, dict):
+            raise InvalidInput("is no mapping; expected the names of columns")
+        parse_columns(mapping)
+    except OSError as error:
+        raise unreadable(path, error) from None
+    except InvalidInput as error:
+        raise error.at(path) from None
+    return mapping
 
 
 def _recorded(options: ReadOptions) -> dict[str, Any]:

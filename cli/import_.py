@@ -29,11 +29,19 @@ from ._options import StreamOptions, stream_options
     show_default=True,
     help="Street side of a rectangular plan of which only area and perimeter are known.",
 )
-def command(stream: StreamOptions, kind: Any, metres: bool, front: Any) -> None:
+@click.option(
+    "--columns",
+    metavar="MAPPING.yaml",
+    help="Which column of an assessor's table holds what; by default the Ames table's.",
+)
+def command(
+    stream: StreamOptions, kind: Any, metres: bool, front: Any, columns: str | None
+) -> None:
     """Read real buildings from the formats that people have.
 
-    The format is told by content, not by file ending: HOT2000 house files and their extract.
-    Implausible entries are clipped or left out by stated rules and counted on standard error.
+    The format is told by content, not by file ending: CityJSON, CityJSONSeq, CityGML, GeoJSON,
+    IFC, HOT2000, HPXML, assessors' tables. Implausible entries are clipped or left out by stated
+    rules and counted on standard error.
 
     \b
     Example:
@@ -41,6 +49,7 @@ def command(stream: StreamOptions, kind: Any, metres: bool, front: Any) -> None:
     """
     from facade_tools.formats.reading import ReadOptions
 
-    from ._import import run_import
+    from ._import import read_columns, run_import
 
-    run_import(ReadOptions(kind=kind, metres=metres, front=front), stream)
+    mapping = read_columns(columns)
+    run_import(ReadOptions(kind, metres, front, mapping), stream)

@@ -43,6 +43,9 @@ FORMATS = (
     Format("CityJSON", "cityjson_reader"),
     Format("CityGML", "citygml"),
     Format("GeoJSON", "geojson"),
+    Format("HPXML", "hpxml"),
+    Format("IFC", "ifc"),
+    Format("assessor table (CSV)", "assessor"),
 )
 
 

@@ -21,7 +21,7 @@ from ..geometry.rectilinear import main_direction, partition, rotated, valid_pol
 from .crs import in_degrees, named
 from .osm import is_building, shape_of
 from .projection import crs_name, to_metres
-from .reading import HEAD_BYTES, Built, ReadOptions, Record
+from .reading import BY_NAME, HEAD_BYTES, Built, ReadOptions, Record
 
 TYPE = re.compile(rb'"type"\s*:\s*"(FeatureCollection|Feature)"')
 CRS = re.compile(rb'"crs"\s*:\s*\{.{0,200}?"name"\s*:\s*"([^"]{1,200})"', re.S)
@@ -109,7 +109,7 @@ def _identity(feature: Mapping[str, Any], tags: Mapping[str, Any], record: Recor
         if isinstance(value, str | int | float) and str(value).strip():
             return str(value).strip()[:180]
     place = record.line if record.line is not None else record.pointer.rpartition("/")[2]
-    return f"feature-{place}"
+    return f"{BY_NAME}-{place}"
 
 
 def _footprint(

@@ -19,7 +19,7 @@ from ..artifacts.provenance import Provenance, Source
 from ..artifacts.store import unreadable
 from ..errors import InvalidInput, Place
 from .detect import Format, detect
-from .reading import HEAD_BYTES, Imported, ReadOptions, Record
+from .reading import BY_NAME, HEAD_BYTES, Imported, ReadOptions, Record
 
 SPOOL_BYTES = 64 << 20  # of standard input in memory; what is longer waits on disk
 
@@ -131,7 +131,8 @@ class Importer:
         record = item.record
         try:
             built = item.format.build(record, self.options)
-            artifacts = [self._asked(artifact) for artifact in built.artifacts]
+            stem = Path(item.source.name).name.split(".")[0] or "stdin"
+            artifacts = [self._asked(_identified(row, stem)) for row in built.artifacts]
         except InvalidInput as error:
             place = Place(item.source.name, record.line, record.pointer or error.place.pointer)
             raise InvalidInput(error.message, place) from None
@@ -147,3 +148,10 @@ class Importer:
         if kind == "attributes" and artifact.kind == "building" and self.convert is not None:
             return self.convert(artifact)
         raise InvalidInput(f"gives {artifact.kind}, not {kind}; leave --as out")
+
+
+def _identified(artifact: Imported, stem: str) -> Imported:
+    """Return the artifact with the file's name in its id, where its source gives it none."""
+    if not artifact.id.startswith(BY_NAME):
+        return artifact
+    return replace(artifact, id=stem.strip("-") + artifact.id.removeprefix(BY_NAME))

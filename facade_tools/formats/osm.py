@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
@@ -153,4 +154,5 @@ def _span(plan: BaseGeometry, style: RoofStyle, direction: Axis) -> float:
 
 
 def _inradius(plan: BaseGeometry) -> float:
-    return float(shapely.maximum_inscribed_circle(plan, tolerance=0.05).length)
+    circle = shapely.maximum_inscribed_circle(np.array([plan]), tolerance=0.05)
+    return float(shapely.length(circle)[0])

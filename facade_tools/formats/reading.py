@@ -21,6 +21,7 @@ Imported = Attributes | Building | Footprint
 Kind = Literal["buildings", "attributes", "footprints"]
 Front = Literal["long", "short", "unknown"]
 
+BY_NAME = "*"  # at the start of an id: stands for the file's name without its ending
 HEAD_BYTES = 1 << 16  # what a detector may look at
 MAX_FILE_BYTES = 512 << 20  # of a format that must be in memory as a whole
 

@@ -1,0 +1,94 @@
+"""Textured meshes by the ending of their file: OBJ by our own reader, the rest through trimesh."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InvalidInput
+from ..geometry.arrays import Floats
+from ..imaging.image_io import Picture
+from .obj_reader import read_obj
+from .textured import GREY, Paint, TexturedMesh, Textures, joined, read_bytes
+
+ENDINGS = (".obj", ".glb", ".gltf", ".ply", ".dae")
+Y_UP = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]], dtype=np.float64)
+
+
+def read_textured(path: Path) -> TexturedMesh:
+    """Return the textured mesh of a file, z up where the format says which way is up, in metres.
+
+    glTF is y up in metres; COLLADA says its unit and axis; OBJ and PLY say neither.
+    """
+    ending = path.suffix.lower()
+    if ending not in ENDINGS:
+        raise InvalidInput(f"is no mesh that can be read; expected {', '.join(ENDINGS)}").at(
+            str(path)
+        )
+    if ending == ".obj":
+        return read_obj(path)
+    data = read_bytes(path)
+    mesh = _through_trimesh(path)
+    matrix = Y_UP if ending in (".glb", ".gltf") else np.eye(3)
+    if ending == ".dae":
+        matrix = _collada_frame(data[:20_000].decode("utf-8", errors="replace"))
+    vertices = mesh.vertices @ matrix.T
+    return TexturedMesh(vertices, mesh.faces, mesh.uv, mesh.paint, mesh.paints, mesh.notes)
+
+
+def _collada_frame(head: str) -> Floats:
+    """Return the matrix to metres, z up, of a COLLADA file's asset element."""
+    unit = re.search(r"<unit\b[^>]*\bmeter\s*=\s*[\"']([0-9.eE+-]+)", head)
+    axis = re.search(r"<up_axis>\s*([XYZ])_UP", head)
+    scale = float(unit.group(1)) if unit else 1.0
+    return scale * (np.eye(3) if axis and axis.group(1) == "Z" else Y_UP)
+
+
+def _through_trimesh(path: Path) -> TexturedMesh:
+    import trimesh
+
+    try:
+        scene = trimesh.load_scene(path, process=False)
+    except Exception as error:  # trimesh raises whatever its parsers raise
+        raise InvalidInput(f"cannot be read as a mesh: {error}").at(str(path)) from None
+    textures = Textures(path.parent)
+    parts = []
+    for node in scene.graph.nodes_geometry:
+        transform, name = scene.graph[node]
+        geometry = scene.geometry[name]
+        if isinstance(geometry, trimesh.Trimesh) and len(geometry.faces):
+            parts.append(_part(geometry, np.asarray(transform)))
+    if not parts:
+        raise InvalidInput("holds no faces; expected a mesh").at(str(path))
+    mesh = joined(parts)
+    notes = (*mesh.notes, *textures.notes)
+    return TexturedMesh(mesh.vertices, mesh.faces, mesh.uv, mesh.paint, mesh.paints, notes)
+
+
+def _part(geometry: Any, transform: Floats) -> TexturedMesh:
+    vertices = np.asarray(geometry.vertices, dtype=np.float64)
+    vertices = vertices @ transform[:3, :3].T + transform[:3, 3]
+    faces = np.asarray(geometry.faces, dtype=np.int64)
+    uv = getattr(geometry.visual, "uv", None)
+    corners = (
+        np.full((len(faces), 3, 2), np.nan)
+        if uv is None or len(uv) != len(vertices)
+        else np.asarray(uv, dtype=np.float64)[faces]
+    )
+    paint, note = _paint(getattr(geometry.visual, "material", None))
+    notes = (note,) if note else ()
+    return TexturedMesh(vertices, faces, corners, np.zeros(len(faces), np.int64), (paint,), notes)
+
+
+def _paint(material: Any) -> tuple[Paint, str]:
+    image = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
+    color = np.asarray(getattr(material, "main_color", [*GREY, 255]))[:3]
+    name = str(getattr(material, "name", "") or "none")
+    rgb = (int(color[0]), int(color[1]), int(color[2]))
+    if image is None:
+        return Paint(name, rgb), f"part {name!r} has no texture: drawn in its plain colour"
+    picture: Picture = np.asarray(image.convert("RGB"), dtype=np.uint8)
+    return Paint(name, rgb, picture), ""

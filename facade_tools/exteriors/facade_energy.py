@@ -11,7 +11,7 @@ from ..artifacts.building import SIDES, Facade
 from ..artifacts.building import Side as SideName
 from ..compiled import compiled
 from ..geometry.arrays import Floats, Integers
-from .facade_attributes import facade_vector, pack_facades, side_values
+from .facade_attributes import facade_vector, pack_facades, side_values, symmetric
 from .facade_layout import (
     ABOVE,
     CENTRE,
@@ -19,6 +19,7 @@ from .facade_layout import (
     CODE,
     DOOR,
     GROUND,
+    HEIGHT,
     LOW,
     LOWER,
     OPEN,
@@ -128,6 +129,67 @@ def _term(value: float, target: float) -> float:
     if np.isnan(target):
         return 0.0
     return ((value - target) / max(target, LEAST_TARGET)) ** 2
+
+
+@compiled
+def least_energy(side: Side) -> tuple[float, Floats]:
+    """Return a lower bound of eq. 4 on a side, and which pieces (p,) are symmetric there.
+
+    The three terms are bounded one by one: the ratio by what stands already, symmetry over the
+    subsets of open pieces, alignment over the fractions that the stacked pieces allow.
+    """
+    wall = (side.pieces[:, 4] * side.pieces[:, 5]).sum()
+    glass = (side.fixed[:, 3] * side.fixed[:, 4]).sum()
+    if side.door[0] >= 0:
+        sub = int(side.door[3])
+        glass += side.subs[sub, WIDTH] * side.subs[sub, HEIGHT]
+    ratio = side.targets[0]
+    bound = _term(glass / wall, ratio) if glass / wall > ratio else 0.0
+    even, plan = _least_symmetry(side, wall)
+    return bound + even + _least_alignment(len(side.stacked), side.targets[2]), plan
+
+
+@compiled
+def _least_alignment(pairs: int, target: float) -> float:
+    least = _term(1.0, target)
+    for n in range(1, pairs + 1):
+        for k in range(n + 1):
+            least = min(least, _term(k / n, target))
+    return least
+
+
+@compiled
+def _least_symmetry(side: Side, wall: float) -> tuple[float, Floats]:
+    """Return the least symmetry term and the plan that reaches it, over at most 2¹² subsets.
+
+    Of more open pieces than twelve, only the largest are varied: the others stay symmetric.
+    """
+    plan = np.ones(len(side.pieces))
+    target = side.targets[1]
+    base = 0.0
+    free = np.zeros(len(side.pieces))
+    for p in range(len(side.pieces)):
+        area = side.pieces[p, 4] * side.pieces[p, 5]
+        first = int(side.pieces[p, 6])
+        own = side.fixed[first : first + int(side.pieces[p, 7])]
+        if side.room[p, OPEN] > 0.0:
+            free[p] = area
+        if side.room[p, OPEN] > 0.0 or symmetric(side.pieces[p, 4], own):
+            base += area
+    largest = np.argsort(-free)[: min(np.count_nonzero(free), 12)]
+    if np.isnan(target):
+        return 0.0, plan
+    least, best = np.inf, 0
+    for mask in range(1 << len(largest)):
+        area = base
+        for k in range(len(largest)):
+            area -= free[largest[k]] * ((mask >> k) & 1)
+        value = _term(area / wall, target)
+        if value < least - 1e-12:
+            least, best = value, mask
+    for k in range(len(largest)):
+        plan[largest[k]] = 1.0 - ((best >> k) & 1)
+    return least, plan
 
 
 @compiled

@@ -38,7 +38,7 @@ class Side(NamedTuple):
     piece. subs (k, 8): number of kind and style, average width and height, 1 for doors, weight on
     the ground and above, row of the narrow twin or −1, least width. door (5,): piece that takes
     the main door or −1, range of its centre, substyle, share of draws at the middle of the range.
-    targets (3,): wwr, sym, align, or NaN.
+    targets (3,): wwr, sym, align, or NaN. plan (p,): 1 where a symmetric layout helps to meet sym.
     """
 
     pieces: Floats
@@ -49,6 +49,7 @@ class Side(NamedTuple):
     subs: Floats
     door: Floats
     targets: Floats
+    plan: Floats
 
 
 @compiled
@@ -74,7 +75,7 @@ def _bounds(side: Side, p: int, sub: int, u: float) -> tuple[float, float]:
     floor, head = side.room[p, FLOOR], side.room[p, HEAD]
     width, height = side.subs[sub, WIDTH], side.subs[sub, HEIGHT]
     if side.subs[sub, DOOR] > 0.0:
-        return floor, height
+        return floor, height if floor >= -1e-6 else 0.0
     lower = max(head - height, floor + LOWEST_SILL, LOWEST_SILL)
     for k in range(len(side.blocked)):
         row = side.blocked[k]
@@ -257,8 +258,7 @@ def draw_piece(
     counts[p] = 0
     if side.room[p, OPEN] == 0.0:
         return
-    sym = side.targets[1] if not np.isnan(side.targets[1]) else 0.8
-    even = rng.random() < 0.1 + 0.8 * sym
+    even = rng.random() < 0.15 + 0.75 * side.plan[p]
     row = genome[p]
     n = _draw_door(rng, side, p, even, row) if side.door[0] == p else 0
     sub = _window(rng, side, p)

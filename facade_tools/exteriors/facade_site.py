@@ -12,6 +12,7 @@ from ..artifacts.building import Side as SideName
 from ..geometry.arrays import Floats, Integers
 from ..geometry.blocked import blocked_rectangles
 from .facade_attributes import pack_facades, stacked
+from .facade_energy import least_energy
 from .facade_layout import (
     ABOVE,
     CENTRE,
@@ -94,6 +95,7 @@ def search_side_of(
         sub_table(rows, codes, standing.name),
         np.array([-1.0, 0.0, 0.0, 0.0, 0.0]),
         np.full(3, np.nan),
+        np.ones(len(pieces)),
     )
 
 
@@ -151,20 +153,23 @@ def _add_twins(table: Floats, windows: Sequence[int]) -> None:
 _KINDS = tuple(dict.fromkeys(END[side] for side in SIDES))
 
 
-def with_door(side: Side, door: MainDoor, targets: Floats) -> Side:
-    """Return a side with the main door to be placed and the targets to be met."""
+def with_door(side: Side, door: MainDoor, targets: Floats) -> tuple[Side, float]:
+    """Return a side with main door, targets and plan, and a lower bound of its energy."""
     row = np.array([door.piece, door.low, door.high, door.sub, door.middle], dtype=np.float64)
-    return side._replace(door=row, targets=targets)
+    placed = side._replace(door=row, targets=targets)
+    least, plan = least_energy(placed)
+    return placed._replace(plan=plan), least
 
 
 @dataclass(frozen=True, slots=True)
 class Solution:
-    """The best genome of a side with its substyles' widths."""
+    """The best genome of a side with its substyles' widths, its energy and a lower bound of it."""
 
     genome: Floats
     counts: Integers
     widths: Floats
     energy: float
+    least: float
 
 
 def facade_of(

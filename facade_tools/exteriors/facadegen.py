@@ -26,8 +26,8 @@ from .palette import house_colors
 
 SIMILAR = 3  # buildings that may lend their elements, in random order
 TRIES = 3  # walls in which the main door is tried where the first does not do
-ENOUGH = 5e-3  # energy that needs no elements of another library building
-GOOD = 2e-3  # energy of a side that needs no further try
+ENOUGH = 5e-3  # energy over its lower bound that needs no elements of another library building
+GOOD = 2e-3  # energy of a side over its lower bound that needs no further try
 MISSED = 0.05  # relative difference from which an attribute counts as not met
 
 
@@ -68,13 +68,12 @@ def generate_facades(
         yield replace(_first_good(attempt.finished(wanted) for attempt in tries), id=identity)
 
 
-def _first_good(buildings: Iterable[Building]) -> Building:
-    """Return the first building that meets its targets well enough, or else the best."""
+def _first_good(attempts: Iterable[tuple[Building, float]]) -> Building:
+    """Return the first building whose energy is near its lower bound, or else the best."""
     best, least = None, np.inf
-    for building in buildings:
-        value = np.inf if building.energy is None else building.energy.facade or 0.0
-        if best is None or value < least:
-            best, least = building, value
+    for building, excess in attempts:
+        if best is None or excess < least:
+            best, least = building, excess
         if least <= ENOUGH:
             break
     assert best is not None
@@ -112,24 +111,27 @@ class _Attempt:
     options: FacadeOptions
     rng: np.random.Generator
 
-    def finished(self, wanted: FacadeAttributes) -> Building:
-        """Return the building with facades, colours and energy."""
+    def finished(self, wanted: FacadeAttributes) -> tuple[Building, float]:
+        """Return the building with facades, colours and energy, and the energy over its bound."""
         colors = self.building.colors or house_colors([self.entry], rng=self.rng)
-        done = replace(self.building, facades=self._facades(wanted), colors=colors)
-        return replace(done, energy=_energy(done, wanted))
+        facades, excess = self._facades(wanted)
+        done = replace(self.building, facades=facades, colors=colors)
+        return replace(done, energy=_energy(done, wanted)), excess
 
-    def _facades(self, wanted: FacadeAttributes) -> dict[Side, Facade]:
+    def _facades(self, wanted: FacadeAttributes) -> tuple[dict[Side, Facade], float]:
         library = self.shelf.library
         rows, codes = part_rows(library, self.entry), Codes()
         sides = self._standing()
         heads = storey_heads(self.building, sides, usual_heads(library, self.entry))
         facades: dict[Side, Facade] = {}
+        excess = 0.0
         for standing, targets in zip(sides, side_targets(wanted), strict=True):
             plain = search_side_of(self.building, standing, rows, codes, heads)
             doors = self._main_doors(sides, standing, plain, rows)
             found, main = self._best(plain, doors, targets)
             facades[standing.name] = facade_of(standing, plain, found, codes, main)
-        return facades
+            excess += found.energy - found.least
+        return facades, excess
 
     def _standing(self) -> list[Standing]:
         """Return the sides with known elements and garage doors."""
@@ -168,12 +170,12 @@ class _Attempt:
         """Return the best layout of a side over the walls that may take the main door."""
         best, main = None, -1
         for door in doors or [MainDoor()]:
-            side = with_door(plain, door, targets)
-            genome, counts, value = search_side(side, self.options.search, rng=self.rng)
+            side, least = with_door(plain, door, targets)
+            genome, counts, value = search_side(side, self.options.search, least, rng=self.rng)
             if best is None or value < best.energy:
-                best = Solution(genome, counts, widths(side, genome, counts), value)
+                best = Solution(genome, counts, widths(side, genome, counts), value, least)
                 main = door.piece
-            if value <= GOOD:
+            if value <= least + GOOD:
                 break
         assert best is not None
         return best, main

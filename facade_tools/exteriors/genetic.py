@@ -112,11 +112,14 @@ def evolve(
 
 
 def search_side(
-    side: Side, search: Search, *, rng: np.random.Generator
+    side: Side, search: Search, least: float = 0.0, *, rng: np.random.Generator
 ) -> tuple[Floats, Integers, float]:
-    """Return genome, counts and energy of the best layout found for a side."""
+    """Return genome, counts and energy of the best layout found for a side.
+
+    least: a lower bound of the energy, near which the search may stop.
+    """
     limits = np.array(
         [search.population, search.elite, search.generations, search.patience, search.least]
     )
-    genome, counts, value, _ = evolve(rng, side, limits, search.enough)
+    genome, counts, value, _ = evolve(rng, side, limits, least + search.enough)
     return genome, counts, float(value)

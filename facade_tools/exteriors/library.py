@@ -63,7 +63,7 @@ class ElementLibrary:
     def nearest(
         self, wanted: Attributes, among: int, rng: np.random.Generator
     ) -> list[LibraryBuilding]:
-        """Return of the `among` most similar buildings those with the fewest wrong bits, shuffled."""
+        """Return those of the `among` most similar buildings with fewest wrong bits, shuffled."""
         distances = self.distances(wanted)
         order = np.argsort(distances, kind="stable")[:among]
         near = order[np.floor(distances[order]) == np.floor(distances[order[0]])]

@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from shapely import Polygon, box
+from shapely.geometry.base import BaseGeometry
+from shapely.geometry.polygon import orient
 
 from ..artifacts.building import SIDES, Building
 from .arrays import Floats, Points3
@@ -24,7 +26,11 @@ log = logging.getLogger("facade_tools.geometry")
 
 @dataclass(frozen=True, slots=True)
 class Opening:
-    """A rectangle (u0, v0, u1, v1, metres) in a wall's frame; wall: key of the wall it is in."""
+    """A rectangle (u0, v0, u1, v1, metres) in a wall's frame.
+
+    wall: key of the wall that holds it. ring: its outline there (n, 2), counter-clockwise, which
+    is the rectangle cut to what of it is wall.
+    """
 
     name: str
     kind: str
@@ -32,6 +38,7 @@ class Opening:
     frame: LocalFrame
     rectangle: tuple[float, float, float, float]
     wall: str = ""
+    ring: tuple[tuple[float, float], ...] = ()
 
 
 def openings_of(building: Building) -> list[Opening]:
@@ -54,49 +61,63 @@ def openings_of(building: Building) -> list[Opening]:
 def pierced(solid: Solid, openings: Sequence[Opening]) -> tuple[Solid, list[Opening | None]]:
     """Return the solid with recessed openings, and for each face the opening that it closes.
 
-    The recess is at most RECESS deep and shallower near a corner, so that two never meet; an
-    opening that touches its wall's edge is cut down to MARGIN from it; one that no wall face can
-    hold is left out with a warning. Walls with openings are owned by `wall-<number>`, their
-    reveals too.
+    The recess is at most RECESS deep and shallower near a corner, so that two never meet. An
+    opening keeps MARGIN from its wall's edges; where a lower roof covers a part of it, the rest
+    remains; one of which less than a fifth remains is left out with a warning. Walls with
+    openings are owned by `wall-<number>`, their reveals too.
     """
     walls = [index for index, label in enumerate(solid.labels) if label.semantic == "wall"]
     held: dict[int, list[tuple[Opening, float]]] = {}
     for opening in openings:
-        found = _wall_of(solid, walls, opening, held)
+        found = max(_places(solid, walls, opening, held), key=_area, default=None)
         if found is None:
             log.warning("%s lies in no wall; left out of LoD3", opening.name)
         else:
-            held.setdefault(found[0], []).append(found[1:])
+            index, shape, depth = found
+            ring = tuple((float(u), float(v)) for u, v in shape.exterior.coords[:-1])
+            fitted = replace(opening, wall=f"wall-{index}", ring=ring)
+            held.setdefault(index, []).append((fitted, depth))
     return _assembled(solid, held)
 
 
-def _wall_of(
+def _area(place: tuple[int, Polygon, float]) -> float:
+    return float(place[1].area)
+
+
+def _places(
     solid: Solid,
     walls: Sequence[int],
     opening: Opening,
     held: dict[int, list[tuple[Opening, float]]],
-) -> tuple[int, Opening, float] | None:
+) -> Iterator[tuple[int, Polygon, float]]:
+    """Yield the walls that can hold an opening, its shape there and how deep it may be."""
+    whole = box(*opening.rectangle)
     for index in walls:
         outline = _outline(solid, index, opening.frame)
         if outline is None:
             continue
-        fitted = _fitted(outline, opening.rectangle)
-        if fitted is None:
-            continue
-        shape = box(*fitted)
-        others = [box(*_in_frame(other, opening.frame)) for other, _ in held.get(index, ())]
-        if any(shape.distance(other) < MARGIN / 2 for other in others):
-            continue
-        depth = min(RECESS, 0.7 * float(outline.exterior.distance(shape)))
-        return index, replace(opening, rectangle=fitted, wall=f"wall-{index}"), depth
-    return None
+        free: BaseGeometry = outline.buffer(-MARGIN, join_style="mitre")
+        for other, _ in held.get(index, ()):
+            free = free.difference(_in_frame(other, opening.frame).buffer(MARGIN / 2))
+        shape = _simple(whole.intersection(free))
+        if shape is not None and shape.area > 0.2 * whole.area:
+            yield index, shape, min(RECESS, 0.7 * float(outline.boundary.distance(shape)))
 
 
-def _in_frame(other: Opening, frame: LocalFrame) -> tuple[float, float, float, float]:
-    """Return the other opening's rectangle in a parallel frame of the same wall."""
-    du, dv = ((other.frame.origin - frame.origin) @ frame.axes.T)[:2]
-    u0, v0, u1, v1 = other.rectangle
-    return u0 + du, v0 + dv, u1 + du, v1 + dv
+def _simple(found: BaseGeometry) -> Polygon | None:
+    """Return the largest polygon, counter-clockwise, without its holes and needless corners."""
+    polygons = [part for part in getattr(found, "geoms", [found]) if isinstance(part, Polygon)]
+    largest = max(polygons, key=lambda part: part.area, default=None)
+    if largest is None or largest.is_empty:
+        return None
+    plain = Polygon(largest.exterior).simplify(1e-4)
+    return orient(plain) if isinstance(plain, Polygon) else None
+
+
+def _in_frame(other: Opening, frame: LocalFrame) -> Polygon:
+    """Return the other opening's outline in a parallel frame of the same wall."""
+    shift = ((other.frame.origin - frame.origin) @ frame.axes.T)[:2]
+    return Polygon(np.array(other.ring) + shift)
 
 
 def _outline(solid: Solid, index: int, frame: LocalFrame) -> Polygon | None:
@@ -108,21 +129,6 @@ def _outline(solid: Solid, index: int, frame: LocalFrame) -> Polygon | None:
         return None
     holes = [((solid.vertices[list(r)] - frame.origin) @ frame.axes.T)[:, :2] for r in face[1:]]
     return Polygon(local[:, :2], holes)
-
-
-def _fitted(
-    outline: Polygon, rectangle: tuple[float, float, float, float]
-) -> tuple[float, float, float, float] | None:
-    """Return the rectangle, cut down to the wall's bounds less MARGIN, if the wall holds it."""
-    low_u, low_v, high_u, high_v = outline.bounds
-    u0, v0 = max(rectangle[0], low_u + MARGIN), max(rectangle[1], low_v + MARGIN)
-    u1, v1 = min(rectangle[2], high_u - MARGIN), min(rectangle[3], high_v - MARGIN)
-    if u1 - u0 < MARGIN or v1 - v0 < MARGIN:
-        return None
-    area = (rectangle[2] - rectangle[0]) * (rectangle[3] - rectangle[1])
-    kept = (u1 - u0) * (v1 - v0) > 0.5 * area
-    safe = outline.buffer(-MARGIN / 2).contains(box(u0, v0, u1, v1))
-    return (u0, v0, u1, v1) if kept and safe else None
 
 
 def _assembled(
@@ -139,10 +145,11 @@ def _assembled(
         holes = []
         extra: list[tuple[Face, Opening | None]] = []
         for opening, depth in rows:
-            outer = tuple(range(count, count + 4))
-            inner = tuple(range(count + 4, count + 8))
+            size = len(opening.ring)
+            outer = tuple(range(count, count + size))
+            inner = tuple(range(count + size, count + 2 * size))
             points.append(_corners(opening, depth))
-            count += 8
+            count += 2 * size
             holes.append(outer[::-1])
             extra += [((quad,), None) for quad in _reveals(outer, inner)]
             extra.append(((inner,), opening))
@@ -157,13 +164,13 @@ def _assembled(
 
 
 def _corners(opening: Opening, depth: float) -> Floats:
-    u0, v0, u1, v1 = opening.rectangle
-    ring = np.array([(u0, v0), (u1, v0), (u1, v1), (u0, v1)])
-    local = [np.column_stack([ring, np.full(4, w)]) for w in (0.0, -depth)]
-    return opening.frame.world(np.concatenate(local))
+    ring = np.array(opening.ring)
+    local = [np.column_stack([ring, np.full(len(ring), w)]) for w in (0.0, -depth)]
+    # Openings in one line shall lie in one line to the last bit: triangulations depend on it.
+    return np.round(opening.frame.world(np.concatenate(local)), 9)
 
 
 def _reveals(outer: tuple[int, ...], inner: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
-    for k in range(4):
-        j = (k + 1) % 4
+    for k in range(len(outer)):
+        j = (k + 1) % len(outer)
         yield outer[k], outer[j], inner[j], inner[k]

@@ -50,8 +50,11 @@ def _cross(a: Points2, b: Points2) -> Floats:
 
 
 def _conforming(points: Points2, triangles: Triangles) -> Triangles:
-    """Split triangles at the points that lie on their edges."""
-    pending = [tuple(row) for row in triangles.tolist()]
+    """Split triangles at the points on their edges; the halves cover what flat ones did."""
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    reach = np.maximum(((b - a) ** 2).sum(axis=1), ((c - a) ** 2).sum(axis=1))
+    flat = np.abs(_cross(b - a, c - a)) <= 1e-9 * reach
+    pending = [tuple(row) for row in triangles[~flat].tolist()]
     done = []
     while pending:
         triangle = pending.pop()

@@ -1,0 +1,247 @@
+"""Detailed scenes: parts where they belong, closed, in the right frame."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import replace
+
+import catalogue
+import numpy as np
+import pytest
+import trimesh
+
+from facade_tools.artifacts.building import Box, Building, Chimney, Element, Facade, Piece, Roof
+from facade_tools.geometry.detail_boxes import box_triangles, side_frame
+from facade_tools.geometry.detail_roofs import THICKNESS, roof_slabs
+from facade_tools.geometry.detail_volumes import porch, prism
+from facade_tools.geometry.details import building_scene, footprint_scene, signed_volume
+from facade_tools.geometry.openings import openings_of, pierced
+from facade_tools.geometry.scenes import bounds, shifts
+from facade_tools.geometry.solids import building_solid, triangulated
+
+BUILDINGS = catalogue.buildings()
+WINDOWS = ("sash", "sliding", "casement", "bay", "fixed", "unknown")
+
+
+def house(*elements: Element, roof: Roof | None = None) -> Building:
+    """A box of 10 x 8 x 3 m with its front on y = 0."""
+    box = Box("main", "general", 5.0, 4.0, 10.0, 8.0, 3.0, roof or Roof("gable", 30.0, "x", 0.4))
+    piece = Piece("front-1", "main", (0.0, 0.0, 0.0), 10.0, 3.0, elements)
+    return Building("house", (box,), {"front": Facade((piece,))})
+
+
+def parts(scene, name):
+    return [mesh for mesh in scene.meshes if mesh.name == name]
+
+
+def as_trimesh(mesh):
+    return trimesh.Trimesh(mesh.vertices, mesh.faces, process=True)
+
+
+@pytest.mark.parametrize("name", BUILDINGS)
+def test_mass_is_a_closed_outward_solid_and_faces_index_vertices(name):
+    before = copy.deepcopy(BUILDINGS[name])
+    scene = building_scene(BUILDINGS[name])
+    assert before == BUILDINGS[name]
+    (mass,) = parts(scene, "mass")
+    assert as_trimesh(mass).is_volume
+    assert signed_volume(mass) > 0.0
+    for mesh in scene.meshes:
+        assert mesh.material in scene.materials
+        assert np.isfinite(mesh.vertices).all()
+        assert len(mesh.faces) == 0 or 0 <= mesh.faces.min() <= mesh.faces.max() < len(
+            mesh.vertices
+        )
+
+
+@pytest.mark.parametrize("style", WINDOWS)
+def test_window_stands_proud_of_its_wall_within_its_place(style):
+    element = Element("window", style, 4.0, 0.9, 1.8, 1.3)
+    scene = building_scene(house(element))
+    meshes = parts(scene, "front/piece-1/window-1")
+    assert {"trim", "glass"} <= {mesh.material for mesh in meshes}
+    points = np.concatenate([mesh.vertices for mesh in meshes])
+    assert points[:, 1].max() <= 1e-9  # the wall is the plane y = 0, outside is y < 0
+    assert points[:, 1].min() > -0.8
+    glass = np.concatenate([mesh.vertices for mesh in meshes if mesh.material == "glass"])
+    assert glass[:, 0].min() > 4.0 - 1e-9
+    assert glass[:, 0].max() < 5.8 + 1e-9
+    assert glass[:, 2].min() > 0.9 - 1e-9
+    assert glass[:, 2].max() < 2.2 + 1e-9
+    for mesh in meshes:
+        assert trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).is_watertight
+        assert signed_volume(mesh) > 0.0
+
+
+@pytest.mark.parametrize(
+    ("kind", "style"), [("door", "panel"), ("door", "patio"), ("garage-door", "sectional")]
+)
+def test_doors_have_depth_and_stay_closed(kind, style):
+    scene = building_scene(house(Element(kind, style, 3.0, 0.0, 2.4, 2.1, main=True)))
+    meshes = parts(scene, f"front/piece-1/{kind}-1")
+    assert len(meshes) >= 2
+    depths = {round(float(y), 4) for mesh in meshes for y in mesh.vertices[:, 1]}
+    assert len(depths) >= 4  # casing, leaf, panels, pane: not one flat colour
+    assert all(signed_volume(mesh) > 0.0 for mesh in meshes)
+
+
+def test_elements_are_numbered_by_kind():
+    window = Element("window", "fixed", 1.0, 1.0, 1.0, 1.0)
+    door = Element("door", "panel", 3.0, 0.0, 1.0, 2.1)
+    scene = building_scene(house(window, door, replace(window, u=6.0)))
+    names = {mesh.name for mesh in scene.meshes if "front/" in mesh.name}
+    assert {
+        "front/piece-1/window-1",
+        "front/piece-1/window-2",
+        "front/piece-1/door-1",
+        "front/piece-1/plinth",
+    } == names
+
+
+@pytest.mark.parametrize(
+    ("side", "u", "out"),
+    [
+        ("front", (1, 0, 0), (0, -1, 0)),
+        ("right", (0, 1, 0), (1, 0, 0)),
+        ("back", (-1, 0, 0), (0, 1, 0)),
+        ("left", (0, -1, 0), (-1, 0, 0)),
+    ],
+)
+def test_frames_run_right_seen_from_outside(side, u, out):
+    frame = side_frame(side, (1.0, 2.0, 3.0))
+    assert np.array_equal(frame.world(np.array([[1.0, 0.0, 0.0]]))[0], np.add((1, 2, 3), u))
+    assert np.array_equal(frame.world(np.array([[0.0, 0.0, 1.0]]))[0], np.add((1, 2, 3), out))
+    assert np.linalg.det(frame.axes) == pytest.approx(1.0)
+
+
+def test_boxes_are_closed_and_none_is_empty():
+    vertices, faces = box_triangles([(0, 0, 0, 1, 2, 3), (5, 5, 5, 6, 6, 6)])
+    assert trimesh.Trimesh(vertices, faces, process=False).volume == pytest.approx(7.0)
+    vertices, faces = box_triangles([])
+    assert vertices.shape == (0, 3)
+    assert faces.shape == (0, 3)
+
+
+def test_prism_is_closed_outward():
+    vertices, faces = prism(np.array([(0.0, 0.0), (3.0, 0.0), (2.0, 1.0), (1.0, 1.0)]), 0.0, 2.0)
+    solid = trimesh.Trimesh(vertices, faces)
+    assert solid.is_volume
+    assert solid.volume == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize("style", catalogue.ROOF_STYLES)
+@pytest.mark.parametrize("plan", catalogue.PLANS)
+def test_slab_covers_the_roof_and_reaches_over_the_walls(plan, style):
+    roof = Roof(style, 35.0, "x", 0.5)
+    building = catalogue.plan_building(plan, roof)
+    solid = building_solid(building)
+    top, fascia = roof_slabs(solid, {box.id: 0.5 for box in building.boxes})
+    low, high = solid.vertices[:, :2].min(axis=0), solid.vertices[:, :2].max(axis=0)
+    reach = np.array(
+        [top.vertices[:, :2].min(axis=0) - low, high - top.vertices[:, :2].max(axis=0)]
+    )
+    assert (reach < -0.3).all()
+    assert (reach > -0.5 * 4.0 - 1e-9).all()
+    # Seen from above, the slab covers the whole plan: its area is at least the mass's.
+    a, b, c = (top.vertices[top.faces[:, k], :2] for k in range(3))
+    p, q = (b - a).T, (c - a).T
+    area = 0.5 * np.abs(p[0] * q[1] - p[1] * q[0]).sum()
+    assert area >= catalogue_area(building) - 1e-6
+    assert len(fascia.faces)
+    # The top lies above the solid's roof by the slab's thickness; a shed's upper edge goes on.
+    rise = 0.5 * np.tan(np.radians(35.0)) if style == "shed" else 0.0
+    top_of_roof = solid.vertices[:, 2].max() + THICKNESS + rise
+    assert top.vertices[:, 2].max() == pytest.approx(top_of_roof)
+
+
+def catalogue_area(building):
+    import shapely
+
+    plans = [
+        shapely.box(b.x - b.width / 2, b.y - b.depth / 2, b.x + b.width / 2, b.y + b.depth / 2)
+        for b in building.boxes
+    ]
+    return shapely.unary_union(plans).area
+
+
+def test_slab_of_a_gable_meets_at_its_ridge_and_follows_its_slope():
+    building = house(roof=Roof("gable", 45.0, "x", 0.5))
+    top, _ = roof_slabs(building_solid(building), {"main": 0.5})
+    z = top.vertices[:, 2] - THICKNESS
+    assert z.min() == pytest.approx(3.0 - 0.5)  # 45 degrees: half a metre out is half a metre down
+    assert z.max() == pytest.approx(3.0 + 4.0)
+    ridge = top.vertices[np.isclose(z, 7.0)]
+    assert np.allclose(ridge[:, 1], 4.0)
+
+
+def test_porch_has_floor_posts_roof_and_none_of_its_posts_stands_in_the_house():
+    building = house()
+    box = Box("porch", "porch", 5.0, -1.0, 6.0, 2.0, 2.5, Roof("shed", 10.0, "y", 0.2))
+    meshes = porch("porch-1", box, replace(building, boxes=(*building.boxes, box)))
+    names = {mesh.name for mesh in meshes}
+    assert {"porch-1/floor", "porch-1/posts", "porch-1/beam", "porch-1/roof"} == names
+    (posts,) = (mesh for mesh in meshes if mesh.name == "porch-1/posts")
+    assert posts.vertices[:, 1].max() < -1.0
+    (beam,) = (mesh for mesh in meshes if mesh.name == "porch-1/beam")
+    assert as_trimesh(beam).is_volume
+
+
+def test_chimney_is_made_of_closed_parts():
+    building = replace(house(), chimneys=(Chimney(2.0, 4.0, 0.8, 0.6, 7.0),))
+    meshes = parts(building_scene(building), "chimney-1")
+    assert {mesh.material for mesh in meshes} == {"brick", "stone", "clay"}
+    assert max(mesh.vertices[:, 2].max() for mesh in meshes) == pytest.approx(7.14)
+
+
+def test_partial_building_without_facades_and_roof_is_drawn():
+    box = Box("main", "general", 0.0, 0.0, 6.0, 6.0, 3.0)
+    scene = building_scene(Building("part", (box,), partial=True))
+    assert {mesh.name for mesh in scene.meshes} == {"mass", "roof"}
+
+
+@pytest.mark.parametrize("name", ["victorian", "bungalow"])
+def test_pierced_solid_stays_closed_and_loses_the_recesses_volume(name):
+    building = BUILDINGS[name] if name in BUILDINGS else next(iter(BUILDINGS.values()))
+    solid = building_solid(building)
+    openings = openings_of(building)
+    cut, closes = pierced(solid, openings)
+    held = [opening for opening in closes if opening is not None]
+    assert len(closes) == len(cut.faces) == len(cut.labels)
+    vertices, triangles, _ = triangulated(cut)
+    recessed = trimesh.Trimesh(vertices, triangles, process=False)
+    assert recessed.is_volume
+    vertices, triangles, _ = triangulated(solid)
+    whole = trimesh.Trimesh(vertices, triangles, process=False).volume
+    areas = [(o.rectangle[2] - o.rectangle[0]) * (o.rectangle[3] - o.rectangle[1]) for o in held]
+    assert whole - recessed.volume <= sum(areas) * 0.12 + 1e-9
+    assert not openings or whole > recessed.volume
+
+
+def test_opening_outside_every_wall_is_left_out_with_a_warning(caplog):
+    building = house(Element("window", "fixed", 40.0, 1.0, 1.0, 1.0))
+    with caplog.at_level("WARNING", logger="facade_tools.geometry"):
+        _, closes = pierced(building_solid(building), openings_of(building))
+    assert closes.count(None) == len(closes)
+    assert "front/piece-1/window-1" in caplog.text
+
+
+def test_models_apart_keep_their_place_and_others_go_side_by_side():
+    one = np.array([[0.0, 0.0, 0.0], [10.0, 8.0, 3.0]])
+    assert not shifts([one, one + np.array([20.0, 0.0, 0.0])]).any()
+    assert shifts([one, one + np.array([20.0, 0.0, 0.0])], always=True).any()
+    moved = [one + step for step in shifts([one, one, one])]
+    for k, a in enumerate(moved):
+        for b in moved[:k]:
+            assert (np.minimum(a[1], b[1]) - np.maximum(a[0], b[0]))[:2].min() <= 0.0
+    assert shifts([]).shape == (0, 3)
+
+
+def test_footprint_scene_is_closed_with_a_slab():
+    from facade_tools.artifacts.footprint import Footprint
+
+    ring = ((0.0, 0.0), (9.0, 0.0), (9.0, 4.0), (4.0, 4.0), (4.0, 10.0), (0.0, 10.0))
+    scene = footprint_scene(Footprint("f", (ring,), 5.0, Roof("flat")))
+    (mass,) = parts(scene, "mass")
+    assert as_trimesh(mass).is_volume
+    assert signed_volume(mass) == pytest.approx(5.0 * 60.0)
+    assert np.allclose(bounds(scene)[0], (0.0, 0.0, 0.0))

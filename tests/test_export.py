@@ -1,0 +1,135 @@
+"""`facade export`: files that other tools open, named and placed as the contract says."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+import trimesh
+
+HOUSE = {
+    "schema": "facade-tools/building/1",
+    "id": "h1",
+    "boxes": [
+        {"id": "main", "kind": "general", "x": 5, "y": 4, "width": 10, "depth": 8, "height": 6,
+         "roof": {"style": "gable", "pitch": 35, "direction": "x", "overhang": 0.4}},
+    ],
+    "facades": {"front": {"pieces": [
+        {"id": "f1", "box": "main", "origin": [0, 0, 0], "width": 10, "height": 3, "elements": [
+            {"kind": "door", "style": "panel", "u": 4.5, "v": 0, "width": 1, "height": 2.1},
+            {"kind": "window", "style": "sash", "u": 1, "v": 0.9, "width": 1.2, "height": 1.4},
+        ]},
+    ]}},
+}  # fmt: skip
+FOOTPRINT = {
+    "schema": "facade-tools/footprint/1",
+    "id": "way-1",
+    "polygon": [[[0, 0], [9, 0], [9, 6], [0, 6]]],
+    "height": 5.0,
+    "roof": {"style": "hip", "pitch": 30, "direction": "x"},
+}
+ENDINGS = ("glb", "obj", "city.json")
+
+
+def stream(*items):
+    return "".join(json.dumps(item) + "\n" for item in items).encode()
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_one_file_by_its_ending(facade, tmp_path, ending):
+    out = tmp_path / f"model.{ending}"
+    assert facade("export", "-", "-o", out, stdin=stream(HOUSE)).returncode == 0
+    again = tmp_path / f"again.{ending}"
+    facade("export", "-", "-o", again, stdin=stream(HOUSE))
+    one, two = (path.read_bytes().replace(b"again", b"model") for path in (out, again))
+    assert one == two
+    left = {path.name for path in tmp_path.iterdir()} - {out.name, again.name}
+    assert left == ({"model.mtl", "again.mtl"} if ending == "obj" else set())
+
+
+def test_glb_has_the_closed_mass_and_names_that_carry_meaning(facade, tmp_path):
+    out = tmp_path / "m.glb"
+    facade("export", "-", "-o", out, stdin=stream(HOUSE))
+    scene = trimesh.load(out)
+    mass = scene.geometry["mass"]
+    assert mass.is_volume
+    assert mass.volume == pytest.approx(480 + 0.5 * 8 * 10 * 2.8008, rel=1e-4)
+    assert mass.bounds[1][1] == pytest.approx(8.8008, abs=1e-3)  # y is up
+    assert {"mass", "front/piece-1/door-1", "front/piece-1/window-1", "roof"} <= set(scene.geometry)
+
+
+@pytest.mark.parametrize("form", ["glb", "obj", "cityjson"])
+def test_a_folder_gets_a_file_an_item_the_same_for_any_jobs(facade, tmp_path, form):
+    items = stream(*({**HOUSE, "id": f"a/{k}"} for k in range(3)), FOOTPRINT)
+    for jobs in (1, 2):
+        folder = tmp_path / str(jobs)
+        done = facade(
+            "export", "-", "-o", f"{folder}/", "--format", form, "--jobs", jobs, stdin=items
+        )
+        assert done.returncode == 0, done.stderr
+    files = sorted(path.name for path in (tmp_path / "1").iterdir())
+    end = {"glb": ".glb", "obj": ".obj", "cityjson": ".city.json"}[form]
+    assert [name for name in files if name.endswith(end)] == [
+        f"a_0{end}", f"a_1{end}", f"a_2{end}", f"way-1{end}"
+    ]  # fmt: skip
+    for name in files:
+        assert (tmp_path / "1" / name).read_bytes() == (tmp_path / "2" / name).read_bytes()
+
+
+def test_several_items_in_one_file_stand_apart_and_are_named(facade, tmp_path):
+    out = tmp_path / "all.glb"
+    items = stream(HOUSE, {**HOUSE, "id": "h2"})
+    assert facade("export", "-", "-o", out, stdin=items).returncode == 0
+    geometry = trimesh.load(out).geometry
+    one, two = geometry["h1/mass"].bounds, geometry["h2/mass"].bounds
+    assert one[1][0] < two[0][0] or two[1][0] < one[0][0]
+    facade("export", "-", "-o", out, "--arrange", "own", stdin=items)
+    geometry = trimesh.load(out).geometry
+    assert (geometry["h1/mass"].bounds == geometry["h2/mass"].bounds).all()
+
+
+def test_a_map_keeps_its_coordinates(facade, tmp_path):
+    far = {**FOOTPRINT, "id": "way-2", "polygon": [[[50, 0], [59, 0], [59, 6], [50, 6]]]}
+    out = tmp_path / "map.city.json"
+    assert facade("export", "-", "-o", out, stdin=stream(FOOTPRINT, far)).returncode == 0
+    extent = json.loads(out.read_bytes())["metadata"]["geographicalExtent"]
+    assert (extent[0], extent[3]) == (0.0, 59.0)
+
+
+def test_standard_output_takes_a_single_file(facade):
+    done = facade("export", "-", "-o", "-", stdin=stream(HOUSE))
+    assert done.stdout.startswith(b"glTF")
+    assert facade("export", "-", "-o", "-", "--format", "obj", stdin=stream(HOUSE)).returncode == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "items", "code", "text"),
+    [
+        (["-o", "x.dae"], [HOUSE], 2, "unknown ending"),
+        ([], [HOUSE], 2, "-o"),
+        (["-o", "x.glb"], [HOUSE, HOUSE], 3, "'h1' stands twice"),
+        (["-o", "x/"], [HOUSE, HOUSE], 3, "'h1' stands twice"),
+        (["-o", "x.glb"], [{**HOUSE, "boxes": []}], 3, "/boxes"),
+        (["-o", "x.glb"], [{"schema": "facade-tools/attributes/1"}], 3, "/schema"),
+    ],
+)
+def test_errors_are_one_line_and_leave_no_file(facade, tmp_path, arguments, items, code, text):
+    done = facade("export", "-", *arguments, stdin=stream(*items), cwd=tmp_path)
+    assert done.returncode == code
+    assert text in done.stderr.decode()
+    assert not list(tmp_path.glob("*.glb"))
+
+
+def test_skip_writes_the_good_ones_and_exits_3(facade, tmp_path):
+    bad = {**HOUSE, "id": "bad", "boxes": []}
+    out = tmp_path / "out"
+    done = facade("export", "-", "-o", f"{out}/", "--on-error", "skip", stdin=stream(bad, HOUSE))
+    assert done.returncode == 3
+    assert [path.name for path in out.iterdir()] == ["h1.glb"]
+
+
+def test_an_empty_stream_is_an_empty_model(facade, tmp_path):
+    (tmp_path / "none.jsonl").write_bytes(b"")
+    out = tmp_path / "none.glb"
+    assert facade("export", tmp_path / "none.jsonl", "-o", out).returncode == 0
+    assert out.read_bytes().startswith(b"glTF")

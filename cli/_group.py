@@ -24,6 +24,7 @@ STAGES: dict[str, Stage] = {
     "sample": Stage("sample", CHAIN, "Draw attribute vectors of new buildings from a model."),
     "massgen": Stage("massgen", CHAIN, "Attributes to mass models with roofs."),
     "facadegen": Stage("facadegen", CHAIN, "Put windows and doors on buildings."),
+    "layer-solve": Stage("layer_solve", CHAIN, "Facades as a stack of layers of patterns."),
     "parse-image": Stage("parse_image", CHAIN, "Read photographs of facades by a grammar."),
     "attributes": Stage("attributes", SUPPORT, "Compute the 49 attributes of buildings."),
     "evaluate": Stage("evaluate", SUPPORT, "Negative log density of buildings under a model."),

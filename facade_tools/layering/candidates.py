@@ -1,0 +1,206 @@
+"""Candidates: tuples of words that may fill the canvas (IMAW15 5.1, eq. 7)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import daqp
+import numpy as np
+
+from .language import counters_of
+from .problem import LEAST_UNSIZED, SLACK, Candidate, Direction, LayerPattern
+from .words import Expansion, Word, WordList, expand, least_size
+
+Ranges = Mapping[str, tuple[int, int]]
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """Eq. 7 of one word: least ≤ known + Σ count · size of the unsized symbols ≤ greatest."""
+
+    known: float
+    counts: tuple[tuple[str, int], ...]
+    least: float
+    greatest: float
+
+
+class Generator:
+    """Generates the candidates of groups at one tolerance, few at a time.
+
+    Several groups stand in one candidate, one after another, where they share counters or
+    unsized symbols.
+
+    `complete` becomes False where a bound left words out.
+    """
+
+    def __init__(self, direction: Direction, groups: Sequence[str], tolerance: float) -> None:
+        self.direction = direction
+        self.rows = [row for group in groups for row in direction.groups[group]]
+        self.parts = tuple(len(direction.groups[group]) for group in groups)
+        self.tops = {sum(self.parts[:i]) for i in range(len(groups))}
+        self.canvas = direction.canvas
+        self.tolerance = tolerance * direction.canvas
+        self.slack = SLACK * direction.canvas
+        self.limit = self.canvas + self.tolerance + self.slack
+        self.least = direction.least_sizes()
+        self.complete = True
+        self._words: dict[tuple[int, tuple[int, ...]], WordList] = {}
+
+    def candidates(self) -> Iterator[Candidate]:
+        """Yield candidates, each tuple of words once, small counters first."""
+        seen: set[tuple[Word, ...]] = set()
+        for counters in self.assignments():
+            for words in self.tuples(counters):
+                if words not in seen:
+                    seen.add(words)
+                    box = self.box(words)
+                    if box is not None:
+                        yield Candidate(words, tuple(sorted(counters.items())), box, self.parts)
+
+    def assignments(self) -> Iterator[dict[str, int]]:
+        """Yield values of the group's counters under which every layer may have a fitting word."""
+        names = sorted(set[str]().union(*(counters_of(row.node) for row in self.rows)))
+        yield from self._assign(names, {name: self.direction.counters[name] for name in names})
+
+    def _assign(self, names: list[str], ranges: dict[str, tuple[int, int]]) -> Iterator[dict[str, int]]:
+        if not self._possible(ranges):
+            return
+        name = next((name for name in names if ranges[name][0] < ranges[name][1]), None)
+        if name is None:
+            yield {name: ranges[name][0] for name in names}
+            return
+        low, high = ranges[name]
+        for start, end in _blocks(low, high):
+            part = ranges | {name: (start, end)}
+            if start == end:
+                yield from self._assign(names, part)
+            elif self._possible(part):
+                for value in range(start, end + 1):
+                    yield from self._assign(names, ranges | {name: (value, value)})
+
+    def _possible(self, ranges: Ranges) -> bool:
+        how = Expansion({}, self.least, self.limit)
+        return all(least_size(row.node, how, ranges) <= self.limit for row in self.rows)
+
+    def words(self, layer: int, counters: Mapping[str, int]) -> list[Word]:
+        """Return the words of a layer that are not too wide."""
+        row = self.rows[layer]
+        used = tuple(counters[name] for name in sorted(counters_of(row.node)))
+        key = (layer, used)
+        if key not in self._words:
+            self._words[key] = self._expanded(row, counters)
+        self.complete = self.complete and self._words[key].complete
+        return self._words[key].words
+
+    def _expanded(self, row: LayerPattern, counters: Mapping[str, int]) -> WordList:
+        transparent = frozenset(n for n, rule in self.direction.rules.items() if rule.transparent)
+        how = Expansion(counters, self.least, self.limit, row.reflection, transparent)
+        return expand(row.node, how)
+
+    def tuples(self, counters: Mapping[str, int]) -> Iterator[tuple[Word, ...]]:
+        """Yield the tuples of words of which each is long enough for its layer."""
+        lists = [self.words(layer, counters) for layer in range(len(self.rows))]
+        if all(lists):
+            yield from self._tuples(lists, (), 0.0)
+
+    def _tuples(
+        self, lists: list[list[Word]], head: tuple[Word, ...], opaque: float
+    ) -> Iterator[tuple[Word, ...]]:
+        if len(head) == len(lists):
+            yield head
+            return
+        opaque = 0.0 if len(head) in self.tops else opaque
+        least = self.canvas - self.tolerance - opaque - self.slack
+        for word in lists[len(head)]:
+            if any(self.direction.rules[a.symbol].size is None for a in word) or (
+                self.known(word) >= least
+            ):
+                above = opaque + self.direction.opaque_size(word)
+                yield from self._tuples(lists, (*head, word), above)
+
+    def known(self, word: Word) -> float:
+        """Return the summed size (m) of a word's sized letters."""
+        return sum(self.direction.rules[letter.symbol].size or 0.0 for letter in word)
+
+    def bounds(self, words: Sequence[Word]) -> list[Bounds]:
+        """Return eq. 7 of every word; the lower bound, too, is eased by the tolerance."""
+        out = []
+        opaque = 0.0
+        for layer, word in enumerate(words):
+            opaque = 0.0 if layer in self.tops else opaque
+            counts: dict[str, int] = {}
+            for letter in word:
+                if self.direction.rules[letter.symbol].size is None:
+                    counts[letter.symbol] = counts.get(letter.symbol, 0) + 1
+            least = self.canvas - self.tolerance - opaque - self.slack
+            out.append(Bounds(self.known(word), tuple(counts.items()), least, self.limit))
+            opaque += self.direction.opaque_size(word)
+        return out
+
+    def box(self, words: Sequence[Word]) -> tuple[tuple[str, float, float], ...] | None:
+        """Return the ranges of the unsized symbols' sizes; None where eq. 7 cannot hold."""
+        bounds = self.bounds(words)
+        least = LEAST_UNSIZED * self.canvas
+        names = sorted({name for row in bounds for name, _ in row.counts})
+        box = {name: (least, self.limit) for name in names}
+        for _ in range(len(names) + 1):
+            for row in bounds:
+                if not _tighten(row, box, self.slack):
+                    return None
+        if len(names) > 1 and point_in(bounds, box) is None:
+            return None
+        return tuple((name, *box[name]) for name in names)
+
+
+def _blocks(low: int, high: int) -> Iterator[tuple[int, int]]:
+    """Yield blocks that double in length, so that what lies too far is left out in a few steps."""
+    length = 1
+    while low <= high:
+        yield low, min(low + length - 1, high)
+        low, length = low + length, 2 * length
+
+
+def _tighten(row: Bounds, box: dict[str, tuple[float, float]], slack: float) -> bool:
+    """Shrink the box by one word's bounds; False where nothing is left."""
+    low = row.known + sum(count * box[name][0] for name, count in row.counts)
+    high = row.known + sum(count * box[name][1] for name, count in row.counts)
+    if low > row.greatest or high < row.least:
+        return False
+    for name, count in row.counts:
+        a, b = box[name]
+        top = (row.greatest - (low - count * a)) / count
+        bottom = (row.least - (high - count * b)) / count
+        box[name] = max(a, bottom), min(b, top)
+        if box[name][0] > box[name][1] + slack:
+            return False
+        box[name] = min(box[name]), max(box[name])
+        low += count * (box[name][0] - a)
+        high += count * (box[name][1] - b)
+    return True
+
+
+def point_in(
+    bounds: Sequence[Bounds],
+    box: Mapping[str, tuple[float, float]],
+    near: Mapping[str, float] | None = None,
+) -> dict[str, float] | None:
+    """Return sizes of the unsized symbols, closest to `near`, that satisfy eq. 7; None if none."""
+    names = sorted(box)
+    goal = near or {name: sum(box[name]) / 2 for name in names}
+    rows = [row for row in bounds if row.counts]
+    matrix = np.zeros((len(rows), len(names)))
+    for i, row in enumerate(rows):
+        for name, count in row.counts:
+            matrix[i, names.index(name)] = count
+    upper = np.array([*(box[name][1] for name in names), *(r.greatest - r.known for r in rows)])
+    lower = np.array([*(box[name][0] for name in names), *(r.least - r.known for r in rows)])
+    unit = max(1e-300, float(np.max(np.abs(upper), initial=0.0)))
+    linear = -np.array([goal[name] for name in names]) / unit
+    x, _, flag, _ = daqp.solve(
+        np.eye(len(names)), linear, matrix, upper / unit, lower / unit,
+        np.zeros(len(upper), dtype=np.int32), primal_tol=1e-9,
+    )  # fmt: skip
+    if flag < 1:
+        return None
+    return dict(zip(names, (np.asarray(x) * unit).tolist(), strict=True))

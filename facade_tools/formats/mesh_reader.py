@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import InvalidInput
 from ..geometry.arrays import Floats
 from ..imaging.image_io import Picture
-from .obj_reader import read_obj
+from .textured_obj import read_obj
 from .textured import GREY, Paint, TexturedMesh, Textures, joined, read_bytes
 
 ENDINGS = (".obj", ".glb", ".gltf", ".ply", ".dae")

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import click
 
+from facade_tools.artifacts.documents import encode
+from facade_tools.artifacts.numbers import dump_line
 from facade_tools.artifacts.store import RawItem
 from facade_tools.artifacts.writing import write_bytes
 from facade_tools.errors import FacadeError, InvalidInput, OutputFailed
@@ -41,11 +43,16 @@ class Part:
         table = CITY if self.form == "cityjson" else SCENES
         artifact = item.artifact(*table)
         try:
-            return load(table[artifact.kind])(artifact)
+            part = load(table[artifact.kind])(artifact)
         except InvalidInput as error:
             raise error.at(item.source, item.line) from None
         except FacadeError as error:
             raise type(error)(f"{artifact.id}: {error}") from None
+        return replace(part, note=_note(artifact)) if self.form == "obj" else part
+
+
+def _note(artifact: Any) -> str:
+    return dump_line(encode(artifact)).decode().strip()
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 
 from ..artifacts.building import Building
+from ..artifacts.documents import encode
 from ..artifacts.footprint import Footprint
+from ..artifacts.numbers import canonical
 from ..geometry.arrays import Points3
 from ..geometry.details import building_scene
 from ..geometry.mesh import Scene
@@ -17,6 +19,7 @@ from ..geometry.openings import Opening, openings_of, pierced
 from ..geometry.solids import Solid, building_solid, footprint_solid
 from .cityjson import CityModel
 
+ARTIFACT = "facade-tools"  # attribute that holds the artifact, for `facade import`
 SEMANTIC = {"ground": "GroundSurface", "wall": "WallSurface", "roof": "RoofSurface"}
 
 
@@ -54,6 +57,7 @@ def building_model(building: Building) -> CityModel:
     styles = [box.roof.style for box in building.boxes if box.kind == "general" and box.roof]
     if styles:
         attributes["roofType"] = styles[0]
+    attributes[ARTIFACT] = canonical(encode(building))
     main: dict[str, Any] = {"type": "Building", "attributes": attributes, "geometry": geometry}
     if installations:
         main["children"] = list(installations)
@@ -67,6 +71,7 @@ def footprint_model(footprint: Footprint) -> CityModel:
     attributes: dict[str, Any] = {"measuredHeight": round(float(solid.vertices[:, 2].max()), 3)}
     if footprint.roof is not None:
         attributes["roofType"] = footprint.roof.style
+    attributes[ARTIFACT] = canonical(encode(footprint))
     main = {"type": "Building", "attributes": attributes, "geometry": [_lod2(solid, table)]}
     return CityModel(footprint.id, table.vertices(), {footprint.id: main})
 

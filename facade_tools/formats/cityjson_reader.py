@@ -15,6 +15,7 @@ from ..artifacts.documents import parse_json
 from ..errors import InvalidInput
 from ..geometry.arrays import Floats
 from . import models
+from .city import ARTIFACT
 from .crs import named
 from .reading import Built, ReadOptions, Record
 from .surfaces import Meaning, Model, Surface, ring
@@ -246,6 +247,7 @@ def _checked_model(root: str, members: Mapping[str, Any], frame: Frame, vertices
             outside.append(surfaces)
     said = members[root].get("attributes") or {}
     total = origin + np.array(frame.translate)
+    artifact = said.get(ARTIFACT)
     return Model(
         id=root,
         parts=tuple(parts),
@@ -255,6 +257,7 @@ def _checked_model(root: str, members: Mapping[str, Any], frame: Frame, vertices
         roof_types=tuple(codes),
         storeys=_count(said.get("storeysAboveGround")),
         outside=tuple(outside),
+        artifact=artifact if isinstance(artifact, dict) else None,
     )
 
 

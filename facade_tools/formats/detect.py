@@ -45,6 +45,7 @@ FORMATS = (
     Format("GeoJSON", "geojson"),
     Format("HPXML", "hpxml"),
     Format("IFC", "ifc"),
+    Format("OBJ with its artifact", "obj_reader"),
     Format("assessor table (CSV)", "assessor"),
 )
 

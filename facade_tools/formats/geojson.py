@@ -133,7 +133,7 @@ def _footprint(
     c, s = np.cos(np.radians(turn)), np.sin(np.radians(turn))
     x, y = np.array([[c, -s], [s, c]]) @ middle
     shift = (round(origin[0] + float(x), 6), round(origin[1] + float(y), 6), 0.0)
-    outline = shapely.get_rings(shapely.force_2d(shapely.normalize(plan)))
+    outline = shapely.get_rings(shapely.orient_polygons(plan))
     return Footprint(
         identity,
         tuple(tuple(map(tuple, shapely.get_coordinates(ring)[:-1].tolist())) for ring in outline),

@@ -251,4 +251,4 @@ def _tags(
         "openings": len(openings),
     }
     source = {name: value for name, value in seen.items() if value}
-    return {**source, "plan_residual": round(residual, 6), **model.attributes}
+    return {**source, "plan_residual": round(residual, 6)}

@@ -9,14 +9,18 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from ..artifacts.building import Frame
+from ..artifacts.building import Building, Frame
+from ..artifacts.documents import decode
 from ..artifacts.footprint import Footprint
 from ..errors import InvalidInput
+from ..geometry.arrays import Floats
 from .model_building import Neighbour, building_of
 from .model_masses import footprint
 from .outbuildings import Outbuildings, adjoining, is_small, kind_of
 from .reading import Built, ReadOptions, Record
 from .surfaces import Model, bounds
+
+SAME_SIZE = 2e-3  # metres
 
 Models = Callable[[], Iterator[Model | InvalidInput]]
 
@@ -73,10 +77,43 @@ def build(record: Record, options: ReadOptions) -> Built:
     if isinstance(payload, Counter):
         return Built((), payload)
     house: House = payload
+    ours, notes = exported(house.model)
+    if ours is not None and options.kind != "footprints":
+        return Built((ours,), notes)
     if options.kind == "footprints":
         return Built((footprint_of(house.model, options),))
-    building, notes = building_of(house.model, house.neighbours, options.front)
-    return Built((building,), notes)
+    building, applied = building_of(house.model, house.neighbours, options.front)
+    return Built((building,), notes + applied)
+
+
+def exported(model: Model) -> tuple[Building | Footprint | None, Counter[str]]:
+    """Return the artifact that our own export left in a model, if the model still looks like it.
+
+    The walls of both must have the same width, depth and height to 2 mm, so that a model edited
+    elsewhere is read by its geometry.
+    """
+    notes: Counter[str] = Counter()
+    if model.artifact is None or not model.surfaces:
+        return None, notes
+    artifact: Building | Footprint = decode(model.artifact, "building", "footprint")
+    walls = [s for s in model.surfaces if s.meaning == "ground"] or model.surfaces
+    low, high = bounds(walls)
+    if np.abs((high - low)[:2] - _plan_size(artifact)).max() <= SAME_SIZE:
+        return artifact, notes
+    notes["geometry differs from the artifact stored with it: geometry read"] += 1
+    return None, notes
+
+
+def _plan_size(artifact: Building | Footprint) -> Floats:
+    if isinstance(artifact, Footprint):
+        points = np.array([point for ring in artifact.polygon for point in ring])
+    else:
+        mass = [box for box in artifact.boxes if box.kind != "porch"]
+        half = np.array([[box.width, box.depth] for box in mass]) / 2.0
+        middle = np.array([[box.x, box.y] for box in mass])
+        points = np.concatenate([middle - half, middle + half])
+    size: Floats = points.max(axis=0) - points.min(axis=0)
+    return size
 
 
 def footprint_of(model: Model, options: ReadOptions) -> Footprint:

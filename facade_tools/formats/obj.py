@@ -8,25 +8,29 @@ from itertools import groupby
 import numpy as np
 
 from ..geometry.mesh import Material, Mesh, Scene
-from .gltf import mime_type
+from .gltf import covered, mime_type
+
+NOTE = "facade-tools artifact:"  # before the JSON of an artifact, in a comment
 
 
 def write(scenes: Sequence[Scene], stem: str) -> dict[str, bytes]:
     """Return the files of an OBJ model by name: textures, `stem`.mtl, `stem`.obj, in this order.
 
-    With several scenes the parts' names are prefixed with their scene's. Vertices are written to
-    the micrometre.
+    The artifacts stand in comments, so that `facade import`
+    gets them back. With several scenes the parts' names are prefixed with their scene's.
+    Vertices are written to the micrometre.
     """
     materials: dict[Material, str] = {}
     pictures: dict[bytes, str] = {}
-    lines = [f"mtllib {stem}.mtl"]
+    lines = [f"# {NOTE} {scene.note}" for scene in scenes if scene.note]
+    lines.append(f"mtllib {stem}.mtl")
     offsets = np.ones(2, dtype=np.int64)
     for scene in scenes:
         prefix = "" if len(scenes) == 1 else f"{scene.name}/"
         for name, group in groupby(scene.meshes, key=lambda mesh: mesh.name):
             lines.append(f"o {_word(prefix + name)}")
             for mesh in group:
-                material = _named(scene.materials[mesh.material], materials)
+                material = _named(covered(scene.materials[mesh.material], mesh), materials)
                 lines.append(f"usemtl {material}")
                 lines.extend(_mesh_lines(mesh, offsets))
     mtl = [

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -69,6 +69,7 @@ class Model:
     so that huge map coordinates lose no precision. function: the source's code. parts: surfaces
     of each building part; a building without parts has one. roof_types: the source's code of each
     part's roof. outside: surfaces of installations (chimneys, dormers, balconies), a list each.
+    artifact: the document of the artifact that our own export left in the file.
     """
 
     id: str
@@ -79,7 +80,7 @@ class Model:
     roof_types: tuple[str, ...] = ()
     storeys: int | None = None
     outside: tuple[tuple[Surface, ...], ...] = ()
-    attributes: Mapping[str, Any] = field(default_factory=dict)
+    artifact: Mapping[str, Any] | None = None
 
     @property
     def surfaces(self) -> tuple[Surface, ...]:

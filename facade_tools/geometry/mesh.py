@@ -12,7 +12,8 @@ class Material:
     """Surface of a mesh: sRGB colour #rrggbb, opacity, roughness and metalness in 0..1.
 
     texture: an encoded PNG or JPEG picture (its bytes), multiplied with the colour. pattern:
-    `siding`, `shingle`, `brick`, `grass` or nothing: a relief that previews draw on the colour.
+    `siding`, `shingle`, `brick` or nothing, drawn on the colour; in files only where the mesh has
+    texture coordinates.
     """
 
     name: str
@@ -42,8 +43,12 @@ class Mesh:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """Meshes and the materials they name; the mesh called `mass` is the closed solid."""
+    """Meshes and the materials they name; the mesh called `mass` is the closed solid.
+
+    note: the artifact as one line of JSON, for formats that carry comments.
+    """
 
     name: str
     meshes: tuple[Mesh, ...]
     materials: dict[str, Material] = field(default_factory=dict)
+    note: str = ""

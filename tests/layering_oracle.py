@@ -50,7 +50,9 @@ def eq7(direction, words, mu):
     rows, opaque = [], 0.0
     for word in words:
         counts, known = unsized_and_known(direction, word)
-        rows.append((counts, known, direction.canvas - mu - opaque - slack, direction.canvas + mu + slack))
+        rows.append(
+            (counts, known, direction.canvas - mu - opaque - slack, direction.canvas + mu + slack)
+        )
         opaque += sum(
             direction.rules[a.symbol].size
             for a in word
@@ -136,7 +138,9 @@ def partitions(direction, words, split, mu):
             count += 1
             if count > MOST_PARTITIONS * 10:
                 raise TooLarge
-            if not any(column) or not allowed(direction, words, column, columns[-1] if columns else None):
+            if not any(column) or not allowed(
+                direction, words, column, columns[-1] if columns else None
+            ):
                 continue
             values = list(sums(column))
             more, wide = omega + max(values) - min(values), sigma + max(values)

@@ -135,7 +135,9 @@ class Aligner:
 
     def _most(self, task: Task) -> float:
         canvas = self.direction.canvas
-        return min(task.budget, task.tolerance * canvas * len(task.candidate.parts)) + SLACK * canvas
+        return (
+            min(task.budget, task.tolerance * canvas * len(task.candidate.parts)) + SLACK * canvas
+        )
 
     def _push(self, queue: list[Any], order: Iterator[int], node: _Node, task: Task) -> bool:
         path, complete = self.search(task, node)
@@ -219,7 +221,8 @@ class Aligner:
         """Return the path with its best sizes if they exist, and how to branch for better ones."""
         exact = least_error(self.direction, path, task.bounds, task.tolerance, node.box)
         tight = exact is not None and exact.omega <= path.omega + SLACK * self.direction.canvas
-        parts = [path.part(i) for i in range(len(path.candidate.parts))]
+        whole = path if exact is None else exact
+        parts = [whole.part(i) for i in range(len(path.candidate.parts))]
         columns = conflict(self.direction, parts) if exact is not None else None
         if columns is not None:
             return None, self._without(node, parts, columns)

@@ -63,7 +63,9 @@ class Generator:
         names = sorted(set[str]().union(*(counters_of(row.node) for row in self.rows)))
         yield from self._assign(names, {name: self.direction.counters[name] for name in names})
 
-    def _assign(self, names: list[str], ranges: dict[str, tuple[int, int]]) -> Iterator[dict[str, int]]:
+    def _assign(
+        self, names: list[str], ranges: dict[str, tuple[int, int]]
+    ) -> Iterator[dict[str, int]]:
         if not self._possible(ranges):
             return
         name = next((name for name in names if ranges[name][0] < ranges[name][1]), None)

@@ -207,7 +207,9 @@ class _Programme:
         found = np.clip(result.x[: len(names)], *np.array(ends[: len(names)]).T)
         return dict(zip(names, found.tolist(), strict=True))
 
-    def _inequalities(self, first: int, columns: int, width: int) -> tuple[list[object], list[float]]:
+    def _inequalities(
+        self, first: int, columns: int, width: int
+    ) -> tuple[list[object], list[float]]:
         rows: list[object] = []
         tops: list[float] = []
         for column in range(columns):

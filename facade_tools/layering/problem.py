@@ -117,7 +117,9 @@ class Alignment:
     def part(self, index: int) -> Alignment:
         """Return the alignment of one of its groups; Ω and Σ stay those of the whole."""
         first, end = self.candidate.split()[index]
-        candidate = replace(self.candidate, words=self.candidate.words[first:end], parts=(end - first,))
+        candidate = replace(
+            self.candidate, words=self.candidate.words[first:end], parts=(end - first,)
+        )
         lines = dict.fromkeys(line[first:end] for line in self.borders)
         return replace(self, candidate=candidate, borders=tuple(lines))
 

@@ -46,7 +46,9 @@ def scale_of(direction: Direction) -> Scale:
     sizes = [rule.size for rule in direction.rules.values() if rule.size is not None]
     for digits in range(MAX_DIGITS):
         scale = 10.0**digits
-        if all(abs(size * scale - round(size * scale)) < 1e-7 for size in [*sizes, direction.canvas]):
+        if all(
+            abs(size * scale - round(size * scale)) < 1e-7 for size in [*sizes, direction.canvas]
+        ):
             return Scale(scale)
     return Scale(10.0 ** max(0, math.ceil(math.log10(UNITS / direction.canvas))))
 

@@ -60,7 +60,11 @@ class GroupSearch:
     """Searches one alignment group of a direction, or several that depend on one another."""
 
     def __init__(
-        self, direction: Direction, groups: tuple[str, ...], clock: Clock, effort: Effort | None = None
+        self,
+        direction: Direction,
+        groups: tuple[str, ...],
+        clock: Clock,
+        effort: Effort | None = None,
     ) -> None:
         self.direction, self.groups, self.clock = direction, groups, clock
         self.effort = effort or Effort()
@@ -172,13 +176,24 @@ class GroupSearch:
         kept = self._kept.get(stage.tolerance)
         return Found(best, complete and kept is not None and kept[1].complete)
 
+    def all_at(self, tolerance: float, splits: bool) -> Iterator[Alignment]:
+        """Yield the best alignment of every candidate that has one, while there is time."""
+        stage = Stage(tolerance, splits)
+        for candidate in self.candidates(tolerance):
+            if self.clock.over():
+                return
+            budget = tolerance * self.direction.canvas
+            found = self._align(candidate, stage, budget, self.effort)
+            if found.alignment is not None:
+                yield found.alignment
+
     def _hopeful(self, candidate: Candidate, stage: Stage, budget: float) -> bool:
         """Tell whether a lower bound on Ω leaves room: see `least_omega`."""
-        return least_omega(self.direction, candidate, stage) <= budget + SLACK * self.direction.canvas
+        return (
+            least_omega(self.direction, candidate, stage) <= budget + SLACK * self.direction.canvas
+        )
 
-    def _align(
-        self, candidate: Candidate, stage: Stage, budget: float, effort: Effort
-    ) -> Found:
+    def _align(self, candidate: Candidate, stage: Stage, budget: float, effort: Effort) -> Found:
         bounds = Generator(self.direction, self.groups, stage.tolerance).bounds(candidate.words)
         task = Task(candidate, tuple(bounds), stage.tolerance, budget, stage.splits, effort)
         return self.aligner.best(task)

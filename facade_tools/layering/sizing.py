@@ -184,7 +184,9 @@ def feasible(equations: System, keep: NDArray[np.bool_] | None = None) -> bool:
     reduced = _reduced(equations.matrix[rows], equations.right[rows])
     if reduced is None:
         return False
-    goal = System((), (), *reduced, (), equations.least, equations.least, np.ones(len(equations.least)))
+    goal = System(
+        (), (), *reduced, (), equations.least, equations.least, np.ones(len(equations.least))
+    )
     return _solve(*reduced, goal)[1] == 1
 
 

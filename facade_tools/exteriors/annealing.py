@@ -231,7 +231,7 @@ def anneal(
         copy_layout(layout, trial)
         propose(trial, target, step, rng)
         chance = rng.random()
-        if valid(trial, target.storey_height):
+        if valid(trial, target):
             proposed = layout_energy(trial, target, work)
             if proposed <= energy or chance < np.exp((energy - proposed) / temperature):
                 copy_layout(trial, layout)
@@ -256,7 +256,7 @@ def hop(pool: Pool, target: Target, hops: int, rng: np.random.Generator, work: W
         copy_layout(pooled(pool, k if pool.energies[k] < np.inf else 0), layout)
         for _ in range(1 + int(rng.random() * 3)):
             propose(layout, target, 1.5, rng)
-        if valid(layout, target.storey_height):
+        if valid(layout, target):
             settle(pool, layout, target, work)
 
 

@@ -11,7 +11,7 @@ from ..artifacts.attributes import Attributes
 from ..artifacts.building import Box
 from ..compiled import compiled
 from ..errors import InvalidInput
-from ..geometry.arrays import Floats
+from ..geometry.arrays import Floats, Rectangles
 from .attributes import attribute_vector, packed_boxes
 from .mass_attributes import (
     ARF,
@@ -60,7 +60,8 @@ class Target(NamedTuple):
 
     values: (27,); weights: (27,) of each squared difference, 0 where the value is unknown and only
     a hint to the search. extra: how many general boxes may be added to the locked ones. tower:
-    whether one box should suit a tower.
+    whether one box should suit a tower. zones: (n, 4) plan rectangles before observed walls,
+    where no box may stand that is not locked.
     """
 
     values: Floats
@@ -68,6 +69,7 @@ class Target(NamedTuple):
     storey_height: float
     extra: int
     tower: bool
+    zones: Rectangles
 
 
 def target_of(attributes: Attributes, without: Iterable[str] = ()) -> Target:
@@ -80,7 +82,8 @@ def target_of(attributes: Attributes, without: Iterable[str] = ()) -> Target:
         norm = float((values[place] ** 2).sum()) or ABSENT_NORM
         weights[place] = 0.0 if name in without else known[place] / norm
     tower = attributes.element.special.get("tower") == 1
-    return Target(values, weights, float(attributes.storey_height), MOST_BOXES, tower)
+    storey_height = float(attributes.storey_height)
+    return Target(values, weights, storey_height, MOST_BOXES, tower, np.empty((0, 4)))
 
 
 @compiled

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..artifacts.attributes import Attributes
 from ..artifacts.building import Building
-from ..geometry.arrays import Booleans, Floats
+from ..geometry.arrays import Booleans, Floats, Rectangles
 from .mass_attributes import ARF, GARAGE_AT, PORCH_AT
 from .mass_energy import Target, target_of
 
@@ -14,6 +14,9 @@ from .mass_energy import Target, target_of
 USUAL_PLAN = ((7.0, 14.0), (7.0, 12.0))  # width, depth (m)
 USUAL_GARAGE = (6.0, 6.2, 2.7)
 USUAL_PORCH = (3.2, 2.0, 2.6)
+CLEAR = 3.0  # free ground before an observed wall (m)
+_RIGHT = {"front": (1, 0), "back": (-1, 0), "left": (0, -1), "right": (0, 1)}
+_OUTWARD = {"front": (0, -1), "back": (0, 1), "left": (-1, 0), "right": (1, 0)}
 
 
 def search_target(
@@ -32,7 +35,20 @@ def search_target(
     if "garage" in complete or "mass" in complete:
         values[GARAGE_AT:PORCH_AT] *= target.weights[GARAGE_AT:PORCH_AT] > 0
     extra = 0 if "mass" in complete else target.extra
-    return target._replace(values=values, extra=extra)
+    return target._replace(values=values, extra=extra, zones=observed_zones(keep))
+
+
+def observed_zones(keep: Building | None) -> Rectangles:
+    """Return plan rectangles (n, 4) right before the observed walls of a partial building (m)."""
+    rows = []
+    for side, facade in keep.facades.items() if keep else ():
+        (rx, ry), (nx, ny) = _RIGHT[side], _OUTWARD[side]
+        for piece in facade.pieces:
+            x, y, _ = piece.origin
+            far_x = x + rx * piece.width + nx * CLEAR
+            far_y = y + ry * piece.width + ny * CLEAR
+            rows.append((min(x, far_x), min(y, far_y), max(x, far_x), max(y, far_y)))
+    return np.array(rows, dtype=np.float64).reshape(-1, 4)
 
 
 def _hint_bbox(

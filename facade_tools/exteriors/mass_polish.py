@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiled import compiled
-from ..geometry.arrays import Floats, Integers
+from ..geometry.arrays import Floats, Integers, Rectangles
+from ..geometry.floors import TOLERANCE
 from .mass_attributes import MASS_SIZE, PORCH
 from .mass_energy import DISCONNECTED, Target
 from .mass_layout import (
@@ -100,15 +101,27 @@ def scatter(variables: Variables, values: Floats, layout: Layout) -> None:
 
 
 @compiled
-def valid(layout: Layout, storey_height: float) -> bool:
-    """Tell whether all boxes are thick and high enough."""
+def _in_zone(row: Floats, zones: Rectangles) -> bool:
+    for zone in zones:
+        x = min(row[2], zone[2]) - max(row[0], zone[0])
+        y = min(row[3], zone[3]) - max(row[1], zone[1])
+        if min(x, y) > TOLERANCE:
+            return True
+    return False
+
+
+@compiled
+def valid(layout: Layout, target: Target) -> bool:
+    """Tell whether all boxes are thick and high enough, and out of the target's zones."""
     for k in range(CAPACITY):
         if layout.kinds[k] == EMPTY:
             continue
         x0, y0, x1, y1, height = layout.rows[k]
-        low = LEAST_HEIGHT if layout.kinds[k] == PORCH else 0.5 * storey_height + 0.01
+        low = LEAST_HEIGHT if layout.kinds[k] == PORCH else 0.5 * target.storey_height + 0.01
         free_plan = layout.locks[k] & PLAN_LOCKED == 0
         if free_plan and min(x1 - x0, y1 - y0) < LEAST_THICKNESS:
+            return False
+        if free_plan and layout.kinds[k] != PORCH and _in_zone(layout.rows[k], target.zones):
             return False
         if height < low and layout.locks[k] & HEIGHT_LOCKED == 0:
             return False
@@ -201,7 +214,7 @@ def polish(layout: Layout, target: Target, work: Work) -> float:
             values = variables.values - step * (LONGEST_MOVE / longest)
             scatter(variables, values, layout)
             energy = _residuals(layout, target, work, trial)
-            if energy < before and valid(layout, target.storey_height):
+            if energy < before and valid(layout, target):
                 damping = max(damping * 0.1, 1e-12)
                 variables.values[:] = values
                 base[:] = trial

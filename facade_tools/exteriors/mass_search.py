@@ -81,7 +81,7 @@ def settle(pool: Pool, layout: Layout, target: Target, work: Work) -> float:
     polish(layout, target, work)
     drop_redundant(layout)
     energy = layout_energy(layout, target, work)
-    if valid(layout, target.storey_height):
+    if valid(layout, target):
         offer(pool, layout, energy, clumsiness(layout, target.tower, work))
     return energy
 
@@ -102,7 +102,7 @@ def informed_round(
     layout = Layout(base.rows.copy(), base.kinds.copy(), base.locks.copy())
     for _ in range(STARTS):
         draw_start(base, target, rng, work, layout)
-        if valid(layout, target.storey_height):
+        if valid(layout, target):
             energy = layout_energy(layout, target, work)
             offer(best, layout, energy + BOX_PRICE * box_count(layout.kinds), 0.0)
     for k in range(POLISHED):

@@ -196,7 +196,7 @@ def test_chimney_is_made_of_closed_parts():
 def test_partial_building_without_facades_and_roof_is_drawn():
     box = Box("main", "general", 0.0, 0.0, 6.0, 6.0, 3.0)
     scene = building_scene(Building("part", (box,), partial=True))
-    assert {mesh.name for mesh in scene.meshes} == {"mass", "roof"}
+    assert {mesh.name for mesh in scene.meshes} == {"mass", "cladding", "roof"}
 
 
 @pytest.mark.parametrize("name", ["victorian", "bungalow"])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import groupby
 from typing import Any
 
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from .. import __version__
 from ..geometry.mesh import Material, Mesh, Scene
+from .tiles import tile
 
 FLOAT, USHORT, UINT = 5126, 5123, 5125
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
@@ -30,6 +31,15 @@ def write(scenes: Sequence[Scene], name: str) -> bytes:
     build = _Build()
     roots = [build.scene(scene, "" if len(scenes) == 1 else f"{scene.name}/") for scene in scenes]
     return build.file(name, roots)
+
+
+def covered(material: Material, mesh: Mesh) -> Material:
+    """Return the material with its pattern as a texture where the mesh can carry one."""
+    if not material.pattern:
+        return material
+    texture = None if mesh.uv is None else tile(material.pattern)
+    suffix = "" if mesh.uv is None else f"-{material.pattern}"
+    return replace(material, name=material.name + suffix, texture=texture, pattern="")
 
 
 def linear(color: str) -> tuple[float, float, float]:
@@ -86,7 +96,7 @@ class _Build:
             indices.tobytes(),
             {"componentType": USHORT if small else UINT, "count": indices.size, "type": "SCALAR"},
         )
-        material = self._material(scene.materials[mesh.material])
+        material = self._material(covered(scene.materials[mesh.material], mesh))
         return {"attributes": attributes, "indices": accessor, "material": material}
 
     def _vertices(self, view: str, rows: NDArray[np.float32], bounded: bool = False) -> int:

@@ -11,13 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .arrays import Floats, Points2, Points3
+from .arrays import Floats, Points2, Points3, Triangles
 from .mesh import Mesh
+from .patterns import pattern_uv
 from .solids import Solid
 from .triangulate import newell_normal, triangulate_rings
 
 THICKNESS = 0.15  # vertical, metres
 RAKE = 0.75  # overhang of a gable's edge relative to that of the eaves
+PATTERN = "shingle"
 MITER = 4.0  # a corner moves at most this many overhangs
 
 Overhang = Callable[[str], float]  # metres, by the owner of a face
@@ -60,7 +62,8 @@ def roof_slabs(solid: Solid, overhang: Mapping[str, float], name: str = "roof") 
             edges.add(*_fascia(_lifted(outline, plane, 0.0), exposed))
         flat = np.concatenate(rings)
         triangles = triangulate_rings(rings)
-        tops.add(_lifted(flat, plane, THICKNESS), triangles)
+        raised = _lifted(flat, plane, THICKNESS)
+        tops.add(raised, triangles, pattern_uv(PATTERN, raised, _normal(plane)))
         edges.add(_lifted(flat, plane, 0.0), triangles[:, ::-1])
     return [tops.mesh(name, "roof"), edges.mesh(name, "fascia")]
 
@@ -70,20 +73,21 @@ class _Collected:
 
     def __init__(self) -> None:
         self.vertices: list[Points3] = []
-        self.faces: list[np.ndarray[tuple[int, int], np.dtype[np.int64]]] = []
+        self.faces: list[Triangles] = []
+        self.uv: list[Points2] = []
         self.count = 0
 
-    def add(
-        self, vertices: Points3, faces: np.ndarray[tuple[int, int], np.dtype[np.int64]]
-    ) -> None:
+    def add(self, vertices: Points3, faces: Triangles, uv: Points2 | None = None) -> None:
         self.vertices.append(vertices)
         self.faces.append(faces + self.count)
         self.count += len(vertices)
+        self.uv += [] if uv is None else [uv]
 
     def mesh(self, name: str, material: str) -> Mesh:
         vertices = np.concatenate([np.zeros((0, 3)), *self.vertices])
         faces = np.concatenate([np.zeros((0, 3), dtype=np.int64), *self.faces])
-        return Mesh(name, vertices, faces, material)
+        uv = np.concatenate(self.uv) if self.uv else None
+        return Mesh(name, vertices, faces, material, uv)
 
 
 def _neighbours(solid: Solid) -> dict[tuple[int, int], int]:
@@ -102,6 +106,11 @@ def _plane(points: Points3) -> tuple[float, float, float]:
     a, b = -nx / nz, -ny / nz
     x, y, z = points.mean(axis=0)
     return float(a), float(b), float(z - a * x - b * y)
+
+
+def _normal(plane: tuple[float, float, float]) -> Floats:
+    normal = np.array([-plane[0], -plane[1], 1.0])
+    return np.asarray(normal / np.linalg.norm(normal))
 
 
 def _lifted(points: Points2, plane: tuple[float, float, float], rise: float) -> Points3:
@@ -168,9 +177,7 @@ def _corner(before: Border, after: Border) -> list[Floats]:
     return [first, second]
 
 
-def _fascia(
-    low: Points3, exposed: list[bool]
-) -> tuple[Points3, np.ndarray[tuple[int, int], np.dtype[np.int64]]]:
+def _fascia(low: Points3, exposed: list[bool]) -> tuple[Points3, Triangles]:
     """Return upright quads of the slab's thickness along the exposed edges."""
     start = low[exposed]
     end = np.roll(low, -1, axis=0)[exposed]

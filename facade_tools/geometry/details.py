@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
@@ -10,6 +11,7 @@ import numpy as np
 from ..artifacts.building import SIDES, Building, Colors, Piece, Side
 from ..artifacts.footprint import Footprint
 from .detail_boxes import Box6, LocalFrame, meshes_of, side_frame
+from .detail_cladding import cladding, wall_pattern
 from .detail_doors import door_parts, garage_door_parts
 from .detail_roofs import roof_slabs
 from .detail_volumes import bay_window, chimney, porch
@@ -35,7 +37,9 @@ def building_scene(building: Building) -> Scene:
     """
     solid = building_solid(building)
     overhang = {box.id: box.roof.overhang for box in building.boxes if box.roof is not None}
-    meshes = [mass_mesh(solid), *roof_slabs(solid, overhang)]
+    colors = building.colors or PALETTE[0]
+    pattern = wall_pattern(building, colors.wall)
+    meshes = [mass_mesh(solid), *cladding(solid, pattern), *roof_slabs(solid, overhang)]
     for side in SIDES:
         if side in building.facades:
             for index, piece in enumerate(building.facades[side].pieces, 1):
@@ -45,7 +49,7 @@ def building_scene(building: Building) -> Scene:
         meshes += porch(f"porch-{index}", box, building)
     for index, stack in enumerate(building.chimneys, 1):
         meshes += chimney(f"chimney-{index}", stack, 0.0)
-    return Scene(building.id, tuple(meshes), materials(building.colors or PALETTE[0]))
+    return Scene(building.id, tuple(meshes), materials(colors, pattern))
 
 
 def footprint_scene(footprint: Footprint) -> Scene:
@@ -53,7 +57,9 @@ def footprint_scene(footprint: Footprint) -> Scene:
     solid = footprint_solid(footprint)
     overhang = 0.0 if footprint.roof is None else footprint.roof.overhang
     meshes = (mass_mesh(solid), *roof_slabs(solid, {"": overhang}))
-    return Scene(footprint.id, meshes, materials(PALETTE[4]))
+    # A footprint knows no colours: its name picks some, so that a street is not all alike.
+    colors = PALETTE[zlib.crc32(footprint.id.encode()) % len(PALETTE)]
+    return Scene(footprint.id, meshes, materials(colors, ""))
 
 
 def mass_mesh(solid: Solid) -> Mesh:
@@ -62,10 +68,10 @@ def mass_mesh(solid: Solid) -> Mesh:
     return Mesh("mass", vertices, triangles, "wall")
 
 
-def materials(colors: Colors) -> dict[str, Material]:
-    """Return the materials of a building by name."""
+def materials(colors: Colors, pattern: str = "siding") -> dict[str, Material]:
+    """Return the materials of a building by name; pattern: of the walls."""
     rows = (
-        Material("wall", colors.wall, roughness=0.85, pattern="siding"),
+        Material("wall", colors.wall, roughness=0.85, pattern=pattern),
         Material("roof", colors.roof, roughness=0.95, pattern="shingle"),
         Material("fascia", colors.trim, roughness=0.7),
         Material("trim", colors.trim, roughness=0.6),

@@ -88,7 +88,7 @@ def _textures(looks: list[Material]) -> tuple[Integers, Floats]:
     rows = [np.zeros((1, 3))]
     known: dict[bytes, tuple[int, int, int]] = {}
     for index, look in enumerate(looks):
-        if look.texture is None:
+        if look.texture is None or look.pattern:
             continue
         if look.texture not in known:
             pixels = _decoded(look.texture)

@@ -44,8 +44,8 @@
     const centre = box.getCenter(new THREE.Vector3());
     const radius = Math.max(box.getSize(new THREE.Vector3()).length() / 2, 0.5);
     const narrow = Math.min(1, camera.aspect);
-    const distance = radius / Math.sin((camera.fov * Math.PI) / 360) / narrow;
-    const towards = new THREE.Vector3(-0.52, 0.3, 0.8).normalize();
+    const distance = radius / Math.sin((camera.fov * Math.PI) / 360) / narrow * 0.86;
+    const towards = new THREE.Vector3(-0.52, 0.2, 0.85).normalize();
     camera.position.copy(centre).addScaledVector(towards, distance);
     camera.near = radius / 50;
     camera.far = distance + 40 * radius;

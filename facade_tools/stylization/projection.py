@@ -1,0 +1,226 @@
+"""Textures of the source projected along face normals onto the remeshed faces (LNSW13 4.1)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..compiled import compiled
+from ..formats.textured import TexturedMesh
+from ..geometry.arrays import Booleans, Floats, Integers
+from ..imaging.image_io import Picture
+from .framing import triangle_areas
+from .remesh import WallFace
+
+MAX_SIDE = 4096  # pixels of one face
+MAX_PIXELS = 60_000_000  # of all faces together
+DEFAULT_DENSITY = 16.0  # pixels a metre where the source has no textures
+MAX_DENSITY = 256.0
+REACH = 0.06  # of the plan's size: how far off a face its texture may lie
+
+# side -> axis along the wall, its direction from left to right, axis of the outward normal, sign
+SIDES = {
+    "front": (0, 1, 1, -1),
+    "right": (1, 1, 0, 1),
+    "back": (0, -1, 1, 1),
+    "left": (1, -1, 0, -1),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Palette:
+    """All pictures of a model as one array of bytes, so that compiled code can read them.
+
+    pixels: flat bytes; table (p, 3): offset, height, width. A plain colour is a 1×1 picture.
+    """
+
+    pixels: Picture
+    table: Integers
+
+
+def palette(mesh: TexturedMesh) -> Palette:
+    """Return the pictures and colours of a mesh as one palette."""
+    pictures = [
+        np.array([[paint.color]], dtype=np.uint8) if paint.picture is None else paint.picture
+        for paint in mesh.paints
+    ]
+    offsets = np.cumsum([0, *(picture.size for picture in pictures)])[:-1]
+    rows = [(o, p.shape[0], p.shape[1]) for o, p in zip(offsets, pictures, strict=True)]
+    return Palette(np.concatenate([p.ravel() for p in pictures]), np.array(rows, dtype=np.int64))
+
+
+def texel_density(mesh: TexturedMesh) -> float:
+    """Return the resolution of a mesh's textures on its walls, pixels a metre (median by area)."""
+    vectors = triangle_areas(mesh.vertices, mesh.faces)
+    area = np.linalg.norm(vectors, axis=1)
+    sizes = [(0, 0) if p.picture is None else p.picture.shape[:2] for p in mesh.paints]
+    height, width = np.array(sizes, dtype=np.float64)[mesh.paint].T
+    e1, e2 = mesh.uv[:, 1] - mesh.uv[:, 0], mesh.uv[:, 2] - mesh.uv[:, 0]
+    texels = 0.5 * np.abs(e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0]) * height * width
+    known = np.isfinite(texels) & (texels > 0) & (area > 1e-9)
+    known &= np.abs(vectors[:, 2]) < 0.5 * area
+    if not known.any():
+        return DEFAULT_DENSITY
+    density = np.sqrt(texels[known] / area[known])
+    order = np.argsort(density)
+    weight = np.cumsum(area[known][order])
+    return float(density[order][np.searchsorted(weight, 0.5 * weight[-1])])
+
+
+def working_density(mesh: TexturedMesh, faces: list[WallFace]) -> float:
+    """Return the density (pixels a metre) at which the faces of a model fit the memory's bound."""
+    density = min(texel_density(mesh), MAX_DENSITY)
+    total = sum(face.width * face.height for face in faces)
+    return min(density, math.sqrt(MAX_PIXELS / max(total, 1e-9)))
+
+
+def face_pictures(
+    mesh: TexturedMesh, faces: list[WallFace], density: float
+) -> list[tuple[Picture, float]]:
+    """Return for every face its picture and the share of it that some texture covers.
+
+    Of several triangles over one pixel the nearest to the face's plane wins. Pixels that nothing
+    covers take the mean colour of the face.
+    """
+    paints = palette(mesh)
+    reach = REACH * float(np.ptp(mesh.vertices[:, :2], axis=0).max())
+    vectors = triangle_areas(mesh.vertices, mesh.faces)
+    length = np.maximum(np.linalg.norm(vectors, axis=1), 1e-30)
+    corners = mesh.vertices[mesh.faces]
+    uv = np.where(np.isfinite(mesh.uv), mesh.uv, 0.0)
+    # two-sided models show their texture on either winding
+    facing = [np.flatnonzero(np.abs(vectors[:, axis]) > 0.5 * length) for axis in range(2)]
+    bounds = [(corners[f].min(axis=1), corners[f].max(axis=1)) for f in facing]
+    results = []
+    for face in faces:
+        along, direction, depth, sign = SIDES[face.side]
+        near = facing[depth][_overlaps(*bounds[depth], face, reach)]
+        view = np.stack(
+            [
+                direction * (corners[near][:, :, along] - face.start),
+                face.top - corners[near][:, :, 2],
+                sign * (corners[near][:, :, depth] - face.place),
+            ],
+            axis=-1,
+        )
+        shape = (_pixels(face.height, density), _pixels(face.width, density))
+        scale = np.array([shape[1] / face.width, shape[0] / face.height])
+        results.append(_drawn(view, uv[near], mesh.paint[near], paints, scale, shape, reach))
+    return results
+
+
+def top_picture(mesh: TexturedMesh, low: Floats, high: Floats, density: float) -> Picture:
+    """Return the view from above of the plan rectangle low…high (m), north up."""
+    width, depth = (float(v) for v in high - low)
+    shape = (min(_pixels(depth, density), 1024), min(_pixels(width, density), 1024))
+    corners = mesh.vertices[mesh.faces]
+    vectors = triangle_areas(mesh.vertices, mesh.faces)
+    flat = np.abs(vectors[:, 2]) > 0.5 * np.maximum(np.linalg.norm(vectors, axis=1), 1e-30)
+    top = float(corners[:, :, 2].max())
+    corners = corners[flat]
+    view = np.stack(
+        [corners[:, :, 0] - low[0], high[1] - corners[:, :, 1], corners[:, :, 2] - top], axis=-1
+    )
+    uv = np.where(np.isfinite(mesh.uv), mesh.uv, 0.0)[flat]
+    scale = np.array([shape[1] / width, shape[0] / depth])
+    reach = float(np.ptp(mesh.vertices[:, 2])) + 1.0
+    return _drawn(view, uv, mesh.paint[flat], palette(mesh), scale, shape, reach)[0]
+
+
+def _pixels(metres: float, density: float) -> int:
+    return min(max(round(metres * density), 1), MAX_SIDE)
+
+
+def _overlaps(low: Floats, high: Floats, face: WallFace, reach: float) -> Booleans:
+    along, _, depth, _ = SIDES[face.side]
+    start, end = min(face.start, face.end), max(face.start, face.end)
+    found: Booleans = (
+        (low[:, along] < end)
+        & (high[:, along] > start)
+        & (low[:, 2] < face.top)
+        & (high[:, 2] > face.bottom)
+        & (low[:, depth] < face.place + reach)
+        & (high[:, depth] > face.place - reach)
+    )
+    return found
+
+
+def _drawn(
+    view: Floats,
+    uv: Floats,
+    paint: Integers,
+    paints: Palette,
+    scale: Floats,
+    shape: tuple[int, int],
+    reach: float,
+) -> tuple[Picture, float]:
+    pixels = view.copy()
+    pixels[:, :, :2] *= scale
+    picture = np.zeros((*shape, 3), dtype=np.uint8)
+    depth = np.full(shape, reach)
+    _rasterise(pixels, uv, paint, paints.pixels, paints.table, picture, depth)
+    covered = depth < reach
+    share = float(covered.mean())
+    if 0 < share < 1:
+        picture[~covered] = np.round(picture[covered].mean(axis=0)).astype(np.uint8)
+    elif not share:
+        picture[:] = 190
+    return picture, share
+
+
+@compiled
+def _rasterise(
+    view: Floats,
+    uv: Floats,
+    paint: Integers,
+    pixels: Picture,
+    table: Integers,
+    picture: Picture,
+    depth: Floats,
+) -> None:
+    """Draw triangles by texture; the pixel keeps the sample of least |distance to the plane|.
+
+    view (m, 3, 3): column, row (pixels) and distance (m). depth (h, w): in, the farthest distance
+    that counts; out, the distance of what was drawn.
+    """
+    rows, columns = depth.shape
+    for t in range(len(view)):
+        x0, y0, d0 = view[t, 0, 0], view[t, 0, 1], view[t, 0, 2]
+        x1, y1, d1 = view[t, 1, 0], view[t, 1, 1], view[t, 1, 2]
+        x2, y2, d2 = view[t, 2, 0], view[t, 2, 1], view[t, 2, 2]
+        area = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
+        if abs(area) < 1e-9:
+            continue
+        top = max(0, math.floor(min(y0, y1, y2)))
+        bottom = min(rows, math.ceil(max(y0, y1, y2)) + 1)
+        left = max(0, math.floor(min(x0, x1, x2)))
+        right = min(columns, math.ceil(max(x0, x1, x2)) + 1)
+        offset, h, w = table[paint[t], 0], table[paint[t], 1], table[paint[t], 2]
+        for row in range(top, bottom):
+            for column in range(left, right):
+                x, y = column + 0.5, row + 0.5
+                b1 = ((x - x0) * (y2 - y0) - (x2 - x0) * (y - y0)) / area
+                b2 = ((x1 - x0) * (y - y0) - (x - x0) * (y1 - y0)) / area
+                b0 = 1.0 - b1 - b2
+                if b0 < -1e-6 or b1 < -1e-6 or b2 < -1e-6:
+                    continue
+                distance = abs(b0 * d0 + b1 * d1 + b2 * d2)
+                if distance >= depth[row, column]:
+                    continue
+                depth[row, column] = distance
+                u = b0 * uv[t, 0, 0] + b1 * uv[t, 1, 0] + b2 * uv[t, 2, 0]
+                v = b0 * uv[t, 0, 1] + b1 * uv[t, 1, 1] + b2 * uv[t, 2, 1]
+                fx = (u - math.floor(u)) * w - 0.5
+                fy = (1.0 - (v - math.floor(v))) * h - 0.5
+                c0, r0 = math.floor(fx), math.floor(fy)
+                ax, ay = fx - c0, fy - r0
+                for channel in range(3):
+                    total = 0.0
+                    for i in range(2):
+                        for j in range(2):
+                            place = ((r0 + i) % h * w + (c0 + j) % w) * 3 + channel
+                            weight = (ay if i else 1.0 - ay) * (ax if j else 1.0 - ax)
+                            total += weight * pixels[offset + place]
+                    picture[row, column, channel] = int(total + 0.5)

@@ -1,4 +1,4 @@
-"""`facade learn`: buildings or attributes to a model."""
+"""`facade learn`: buildings, attributes or a table to a model."""
 
 from __future__ import annotations
 
@@ -8,39 +8,52 @@ import click
 
 from . import _options
 
+VARIANTS = ("full", "no-lateral", "no-middle", "flat", "gmm")
+
 
 @click.command()
-@_options.inputs("BUILDINGS|ATTRIBUTES...")
+@_options.inputs("BUILDINGS|ATTRIBUTES|TABLE.csv...")
 @_options.output
 @_options.seed
+@click.option(
+    "--variant",
+    type=click.Choice(VARIANTS),
+    default="full",
+    show_default=True,
+    help="The whole model, or one of the paper's alternatives.",
+)
+@click.option("--faithful", is_flag=True, help="The paper's plain model: no transforms.")
 @click.option(
     "--prior",
     metavar="BUILDINGS",
     help="Where attributes come from that no input observes; default: the shipped sample houses.",
 )
-def command(inputs: tuple[str, ...], output: str | None, seed: int, prior: str | None) -> None:
+@click.option(
+    "--restarts",
+    type=click.IntRange(1, 100),
+    default=1,
+    show_default=True,
+    help="Structure searches; all but the first begin at random.",
+)
+@click.option(
+    "--holdout",
+    type=click.IntRange(1, 100),
+    metavar="K",
+    help="Also compare all variants on K random 80/20 splits, on standard error.",
+)
+@click.option("--report", metavar="PATH.html", help="Write a self-contained report.")
+@click.option("--groups", metavar="GROUPS.yaml", help="Which columns of a table form groups.")
+def command(**options: Any) -> None:
     """Learn the graphical model of building exteriors (FW16 5) from buildings or attributes.
 
-    Inputs are .json, .jsonl and .yaml files, folders of them, or -; null means unobserved.
+    Inputs are .json, .jsonl and .yaml files, folders of them, or -; null means unobserved. A table
+    is any .csv whose columns --groups assigns; an empty cell means unobserved.
 
     \b
-    Example: facade learn sample_data/houses -o model.json
+    Example:
+      facade learn sample_data/houses -o model.json --report report.html
+      facade learn table.csv --groups groups.yaml -o model.json
     """
-    from dataclasses import replace
+    from ._learning import run_learn
 
-    from facade_tools.artifacts.provenance import Provenance
-    from facade_tools.exteriors.learning import LearnOptions, learn_model
-    from facade_tools.randomness import item_generator
-
-    from ._learning import read_attributes
-    from ._stream import write_result
-
-    rows, sources = read_attributes(inputs)
-    more: Any = None
-    if prior is not None:
-        more, extra = read_attributes([prior])
-        sources += extra
-    options = LearnOptions(prior_rows=more)
-    model = learn_model(rows, rng=item_generator(seed, "learn"), options=options)
-    provenance = Provenance("learn", seed, {}, sources)
-    write_result(replace(model, provenance=provenance), output)
+    run_learn(**options)

@@ -10,22 +10,46 @@ from . import _options
 @click.command()
 @click.argument("model", metavar="MODEL")
 @click.option("-n", "count", type=click.IntRange(0), default=1, show_default=True, help="How many.")
+@click.option("--given", metavar="PARTIAL", help="Partial building or attributes to complete.")
 @click.option("--style", type=click.IntRange(0), help="Draw only from this style (from 0).")
+@click.option("--top", is_flag=True, help="Keep the most probable of at least 2,000 draws.")
+@click.option(
+    "--min-distance",
+    metavar="D",
+    type=click.FloatRange(0),
+    default=0.0,
+    show_default=True,
+    help="Root mean square distance, in standard deviations a coordinate, that samples keep from "
+    "training buildings and from each other.",
+)
 @_options.output
 @_options.seed
-def command(model: str, count: int, style: int | None, output: str | None, seed: int) -> None:
-    """Draw attribute vectors of new buildings from a model (FW16 5, 7).
+def command(
+    model: str,
+    count: int,
+    given: str | None,
+    style: int | None,
+    top: bool,
+    min_distance: float,
+    output: str | None,
+    seed: int,
+) -> None:
+    """Draw attribute vectors of new buildings from a model (FW16 5, 7), or complete a partial one.
 
     \b
-    Example: facade sample model.json -n 20 --seed 7 -o attributes.jsonl
+    Example:
+      facade sample model.json -n 20 --seed 7 -o attributes.jsonl
+      facade sample model.json --given partial.yaml --top -n 5
     """
     from facade_tools.exteriors.drawing import SampleOptions, sample_attributes
     from facade_tools.randomness import item_generator
 
-    from ._learning import load_model, write_samples
+    from ._learning import load_model, read_given, write_samples
 
     loaded, source = load_model(model)
-    options = SampleOptions(style=style, prefix=str(seed))
-    rows = sample_attributes(loaded, count, rng=item_generator(seed, "sample"), options=options)
-    recorded = {} if style is None else {"style": style}
-    write_samples(rows, output, seed, recorded, (source,))
+    options = SampleOptions(style, top, min_distance, prefix=str(seed))
+    known, sources = read_given(given)
+    rng = item_generator(seed, "sample")
+    rows = sample_attributes(loaded, count, rng=rng, given=known, options=options)
+    recorded = {"style": style, "top": top, "min_distance": min_distance}
+    write_samples(rows, output, seed, recorded, (source, *sources))

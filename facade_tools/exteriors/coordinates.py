@@ -1,7 +1,7 @@
 """Attribute vectors to rows of free coordinates and back.
 
-The 49 numbers depend on one another exactly, so the model stands on free coordinates (docs/model.md):
-own units outside, an unbounded standardised scale inside, atoms apart.
+The 49 numbers depend on one another exactly, so the model stands on free coordinates: own units
+outside, an unbounded standardised scale inside, atoms apart (docs/model.md).
 """
 
 from __future__ import annotations
@@ -48,12 +48,10 @@ class Readings:
 
 def stack(first: Readings, second: Readings) -> Readings:
     """Return the rows of both."""
-    pairs = [
-        tuple(np.concatenate(pair) for pair in zip(a, b, strict=True))
-        for a, b in ((first.values, second.values), (first.parts, second.parts))
-    ]
+    values = tuple(map(np.concatenate, zip(first.values, second.values, strict=True)))
+    parts = tuple(map(np.concatenate, zip(first.parts, second.parts, strict=True)))
     bits = np.concatenate([first.bits, second.bits])
-    return Readings(first.ids + second.ids, pairs[0], pairs[1], bits)
+    return Readings(first.ids + second.ids, values, parts, bits)
 
 
 def read_attributes(
@@ -72,14 +70,15 @@ def read_attributes(
             reading = group.read(row)
             values[i].append(reading.values)
             parts[i].append(reading.parts)
-    return Readings(
-        tuple(ids),
-        tuple(
-            _matrix(v, len(g.coordinates), np.float64) for v, g in zip(values, active, strict=True)
-        ),
-        tuple(_matrix(p, len(g.parts), np.int8) for p, g in zip(parts, active, strict=True)),
-        _matrix(bits, len(layout.bits), np.int8),
-    )
+    wide = [_matrix(v, len(g.coordinates), np.float64) for v, g in zip(values, active, strict=True)]
+    there = [_matrix(p, len(g.parts), np.int8) for p, g in zip(parts, active, strict=True)]
+    out = Readings(tuple(ids), tuple(wide), tuple(there), _matrix(bits, len(layout.bits), np.int8))
+    return join(out) if is_merged(layout, active) else out
+
+
+def is_merged(layout: Layout, groups: tuple[Group, ...]) -> bool:
+    """Tell whether the layout keeps all groups as one (`layout.merged`)."""
+    return len(layout.groups) == 1 < len(groups)
 
 
 def _bits(row: Attributes, layout: Layout) -> Iterator[int | None]:
@@ -100,6 +99,8 @@ def write_attributes(
 ) -> Iterator[Attributes]:
     """Yield the attribute vectors of complete rows."""
     active = declared(layout.boundary, groups)
+    if is_merged(layout, active):
+        readings = split(readings, active)
     values = [v.tolist() for v in readings.values]
     parts = [p.tolist() for p in readings.parts]
     bits = readings.bits.tolist()
@@ -161,10 +162,17 @@ def blank(count: int, layout: Layout, ids: tuple[str, ...]) -> Readings:
     return Readings(ids, values, parts, np.full((count, len(layout.bits)), UNSEEN, dtype=np.int8))
 
 
-def join(readings: Readings, layout: Layout) -> Readings:
+def join(readings: Readings) -> Readings:
     """Return rows of the merged layout (`layout.merged`): all groups side by side."""
-    if len(layout.groups) == len(readings.values):
-        return readings
     values = np.concatenate(readings.values, axis=1)
     parts = np.concatenate(readings.parts, axis=1)
     return Readings(readings.ids, (values,), (parts,), readings.bits)
+
+
+def split(readings: Readings, groups: tuple[Group, ...]) -> Readings:
+    """Return rows of the merged layout group by group again."""
+    wide = np.cumsum([len(g.coordinates) for g in groups])[:-1]
+    there = np.cumsum([len(g.parts) for g in groups])[:-1]
+    values = tuple(np.split(readings.values[0], wide, axis=1))
+    parts = tuple(np.split(readings.parts[0], there, axis=1))
+    return Readings(readings.ids, values, parts, readings.bits)

@@ -9,23 +9,53 @@ import numpy as np
 
 from ..artifacts.attributes import Attributes, Sample
 from ..artifacts.model import Model
-from .coordinates import Readings, write_attributes
+from ..errors import Infeasible, InvalidInput
+from .completion import Completion, completions, distances, overlaid
+from .coordinates import Floats, Readings, stack, write_attributes
+from .dataset import Ints
 from .density import log_density
 from .groups import GROUPS, Group
 from .neighbours import Neighbours
 from .network import Network
-from .sampling import BLOCK, Draws, draw_block
+from .sampling import draw_block
 from .serialisation import network_of
+
+POOL = 2000  # draws of which --top keeps the most probable
+POOL_EACH = 50  # and at least this many for each that is kept
+DISTINCT = 0.05  # standard deviations by which the most probable differ from each other
+LIMIT = 200_000  # draws that may be turned down for one that is taken
 
 
 @dataclass(frozen=True, slots=True)
 class SampleOptions:
-    """style: fixes S (from 0). prefix: of the ids `<prefix>-<index>`."""
+    """How to sample.
+
+    style: fixes S (from 0). top: only the most probable of many. min_distance: from training rows
+    and earlier samples, root mean square standard deviations a coordinate. prefix: of the ids
+    `<prefix>-<index>`. neighbours: whether samples name the training rows nearest to them.
+    """
 
     style: int | None = None
+    top: bool = False
+    min_distance: float = 0.0
     prefix: str = "0"
     groups: tuple[Group, ...] = GROUPS
     neighbours: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Complete rows with their styles and densities."""
+
+    readings: Readings
+    style: Ints
+    density: Floats
+    effective: float | None = None
+
+    def take(self, index: Ints) -> Block:
+        """Return some of the rows."""
+        rows = self.readings.take(index)
+        return Block(rows, self.style[index], self.density[index], self.effective)
 
 
 def sample_attributes(
@@ -36,35 +66,113 @@ def sample_attributes(
     given: Attributes | None = None,
     options: SampleOptions = SampleOptions(),
 ) -> Iterator[Attributes]:
-    """Yield n complete attribute vectors; sample i is the same for every n above it.
+    """Yield n complete attribute vectors; sample i is the same for every n above it (but --top).
 
-    given: what is known of the building; it stays as it is, to the last bit.
+    given: what is known of the building; it stays as it is, to the last bit. Raises InvalidInput
+    on a style that the model lacks, Infeasible where nothing meets what is asked for.
     """
     network = network_of(model)
-    finder = Neighbours(model, network) if options.neighbours else None
+    if options.style is not None and options.style >= len(network.style):
+        count = len(network.style)
+        raise InvalidInput(f"style {options.style}; expected one of the model's {count}, from 0")
+    finder = Neighbours(model, network)
+    blocks = draw(network, rng, given, options)
+    chosen = top(blocks, n, finder, options) if options.top else blocks
+    if options.min_distance > 0 and not options.top:
+        chosen = apart(blocks, finder, options.min_distance)
     done = 0
-    while done < n:
+    for block in chosen if n else ():
+        rows = block.take(np.arange(min(len(block.style), n - done)))
+        yield from annotated(rows, done, network, model, finder, given, options)
+        done += len(rows.style)
+        if done >= n:
+            return
+
+
+def draw(
+    network: Network, rng: np.random.Generator, given: Attributes | None, options: SampleOptions
+) -> Iterator[Block]:
+    """Yield blocks of complete rows without end."""
+    while given is None:
         draws = draw_block(network, rng=rng, style=options.style)
-        take = min(BLOCK, n - done)
-        ids = tuple(f"{options.prefix}-{done + i}" for i in range(take))
-        rows = replace(draws.readings.take(np.arange(take)), ids=ids)
-        yield from annotated(network, Draws(rows, draws.style[:take]), model, finder, options)
-        done += take
+        yield Block(draws.readings, draws.style, log_density(network, draws.readings))
+    found: Iterator[Completion] = completions(
+        network, given, options.groups, rng=rng, style=options.style
+    )
+    for one in found:
+        rows = one.draws.readings
+        yield Block(rows, one.draws.style, log_density(network, rows), one.effective)
+
+
+def top(
+    blocks: Iterator[Block], n: int, finder: Neighbours, options: SampleOptions
+) -> Iterator[Block]:
+    """Yield one block: the n most probable distinct rows of a pool."""
+    pool = next(blocks)
+    while len(pool.style) < max(POOL, POOL_EACH * n):
+        more = next(blocks)
+        pool = Block(
+            stack(pool.readings, more.readings),
+            np.concatenate([pool.style, more.style]),
+            np.concatenate([pool.density, more.density]),
+            more.effective,
+        )
+    ranked = pool.take(np.argsort(-pool.density, kind="stable"))
+    distance = max(options.min_distance, DISTINCT)
+    against = finder.training() if options.min_distance > 0 else None
+    kept = spread(finder.whole(ranked.readings), against, distance, n)
+    if len(kept) < n:
+        raise Infeasible(f"only {len(kept)} of {n} most probable samples differ by {distance}")
+    yield ranked.take(kept)
+
+
+def apart(blocks: Iterator[Block], finder: Neighbours, distance: float) -> Iterator[Block]:
+    """Yield the rows that keep their distance from training rows and from earlier ones."""
+    earlier: Floats = finder.training()
+    turned_down = 0
+    for block in blocks:
+        points = finder.whole(block.readings)
+        kept = spread(points, earlier, distance, len(points))
+        turned_down = 0 if len(kept) else turned_down + len(points)
+        if turned_down > LIMIT:
+            raise Infeasible(f"no sample in {turned_down} is {distance} away from all others")
+        earlier = np.concatenate([earlier.reshape(-1, points.shape[1]), points[kept]])
+        if len(kept):
+            yield block.take(kept)
+
+
+def spread(points: Floats, others: Floats | None, distance: float, most: int) -> Ints:
+    """Return the first rows that are `distance` from the others and from each other."""
+    free = np.ones(len(points), dtype=np.bool_)
+    if others is not None and len(others):
+        free &= distances(points, others).min(axis=1) >= distance
+    kept: list[int] = []
+    for i in np.flatnonzero(free):
+        if not kept or distances(points[[i]], points[kept]).min() >= distance:
+            kept.append(int(i))
+        if len(kept) >= most:
+            break
+    return np.array(kept, dtype=np.int64)
 
 
 def annotated(
-    network: Network, draws: Draws, model: Model, finder: Neighbours | None, options: SampleOptions
+    block: Block,
+    first: int,
+    network: Network,
+    model: Model,
+    finder: Neighbours,
+    given: Attributes | None,
+    options: SampleOptions,
 ) -> Iterator[Attributes]:
-    """Yield draws as artifacts."""
-    rows = draws.readings
-    density = log_density(network, rows).tolist()
-    near = [] if finder is None else list(finder.nearest(rows))
-    heights = np.full(len(rows), model.storey_height)
-    written = write_attributes(rows, network.layout, heights, options.groups)
-    for i, attributes in enumerate(written):
-        names = (
-            {name: finder.ids[index[i]] for name, index, _ in near if index[i] >= 0}
-            if finder
-            else {}
-        )
-        yield replace(attributes, sample=Sample(int(draws.style[i]), density[i], names))
+    """Yield rows as artifacts, their ids counted from `first`."""
+    count = len(block.style)
+    ids = tuple(f"{options.prefix}-{first + i}" for i in range(count))
+    rows = replace(block.readings, ids=ids)
+    near = list(finder.nearest(rows)) if options.neighbours else []
+    heights = np.full(count, model.storey_height)
+    density, style = block.density.tolist(), block.style.tolist()
+    for i, row in enumerate(write_attributes(rows, network.layout, heights, options.groups)):
+        names = {name: finder.ids[index[i]] for name, index, _ in near if index[i] >= 0}
+        note = Sample(style[i], density[i], names, block.effective)
+        whole = row if given is None else overlaid(row, given)
+        yield replace(whole, sample=note)

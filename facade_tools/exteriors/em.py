@@ -24,8 +24,8 @@ class Prior:
 
     style, hidden, table, bit: Dirichlet pseudo-counts, spread evenly over the states (hidden: over
     the group's own cluster shares). mean: of cluster means around the overall mean. slope: of
-    lateral coefficients around 0. spread, freedom: inverse Wishart with mode about `spread` times
-    the overall variance.
+    lateral coefficients around 0. spread, freedom: Wishart on the precision with d + freedom
+    degrees; the covariance is expected near (d + freedom) · `spread` of the overall variance.
     """
 
     style: float = 1.0
@@ -34,7 +34,7 @@ class Prior:
     bit: float = 1.0
     mean: float = 0.05
     slope: float = 1.0
-    spread: float = 0.1
+    spread: float = 0.06
     freedom: float = 2.0
 
 
@@ -74,13 +74,18 @@ def fit_gaussian(
     a = uu + np.diag(prior_precision(width, prior))
     coef = np.linalg.solve(a, np.swapaxes(xu, 1, 2)).swapaxes(1, 2)
     scatter = xx - coef @ a @ np.swapaxes(coef, 1, 2)
-    freedom = d + prior.freedom
-    total = uu[:, 0, 0][:, None, None] + freedom + d + 1 + width
-    return coef, clip(_wishart_scale(d, prior) + scatter, total, floor)
+    total = uu[:, 0, 0][:, None, None] + _power(width, prior)
+    return coef, clip(wishart_scale(d, prior) + scatter, total, floor)
 
 
-def _wishart_scale(d: int, prior: Prior) -> Floats:
-    return np.eye(d) * prior.spread * (2 * d + 2 + prior.freedom)
+def _power(width: int, prior: Prior) -> float:
+    """Return the power of |precision|^(1/2) in the prior: the mode is that of the precision."""
+    return prior.freedom - 1 + width
+
+
+def wishart_scale(d: int, prior: Prior) -> Floats:
+    """Return the scale of the inverse Wishart prior, (d, d)."""
+    return np.eye(d) * prior.spread * (d + prior.freedom)
 
 
 def clip(scatter: Floats, total: Floats, floor: Floats) -> Floats:
@@ -118,9 +123,15 @@ def statistics(
 def maximise(family: Family, stats: Statistics, floor: Floats, prior: Prior) -> Family:
     """Return the family at the maximum of its part of the expected log posterior."""
     coef, cov = fit_gaussian(stats.uu, stats.xu, stats.xx, floor, prior)
-    tables = tuple(fit_table(t, prior.table) for t in stats.tables)
+    tables = tuple(_atoms(t, family.tied, prior) for t in stats.tables)
     hidden = family.hidden if family.direct else fit_table(stats.hidden, prior.hidden)
     return replace(family, hidden=hidden, tables=tables, coef=coef, cov=cov)
+
+
+def _atoms(counts: Floats, tied: bool, prior: Prior) -> Floats:
+    if not tied:
+        return fit_table(counts, prior.table)
+    return np.tile(fit_table(counts.sum(axis=0), prior.table), (len(counts), 1))
 
 
 # --- prior density ------------------------------------------------------------------------------
@@ -134,7 +145,8 @@ def log_prior(network: Network, prior: Prior) -> float:
     for family in network.families:
         if not family.direct:
             total += _log_dirichlet(family.hidden, prior.hidden)
-        total += sum(_log_dirichlet(t, prior.table) for t in family.tables)
+        shown = [t[:1] if family.tied else t for t in family.tables]
+        total += sum(_log_dirichlet(t, prior.table) for t in shown)
         total += _log_normal_wishart(family, prior)
     return float(total)
 
@@ -149,11 +161,10 @@ def _log_normal_wishart(family: Family, prior: Prior) -> float:
     if d == 0:
         return 0.0
     precision = np.diag(prior_precision(width, prior))
-    scatter = _wishart_scale(d, prior) + family.coef @ precision @ family.coef.swapaxes(1, 2)
-    power = d + prior.freedom + d + 1 + width
+    scatter = wishart_scale(d, prior) + family.coef @ precision @ family.coef.swapaxes(1, 2)
     logdet = np.linalg.slogdet(family.cov)[1]
     trace = np.trace(np.linalg.solve(family.cov, scatter), axis1=1, axis2=2)
-    return float(-0.5 * (power * logdet + trace).sum())
+    return float(-0.5 * (_power(width, prior) * logdet + trace).sum())
 
 
 # --- the loop -----------------------------------------------------------------------------------

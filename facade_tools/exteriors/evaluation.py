@@ -9,10 +9,16 @@ import numpy as np
 from ..artifacts.attributes import Attributes
 from ..artifacts.model import Model
 from ..errors import InvalidInput
+from ..randomness import item_generator
+from .conditioning import draw_given
 from .coordinates import Floats, Readings, read_attributes
-from .density import log_density
+from .dataset import build
+from .density import entangled, log_density
 from .groups import GROUPS, Group
+from .network import Network
 from .serialisation import network_of
+
+DRAWS = 1000
 
 
 def negative_log_density(
@@ -28,7 +34,23 @@ def negative_log_density(
     empty = np.flatnonzero(nothing_observed(readings))
     if len(empty):
         raise InvalidInput(f"{readings.ids[empty[0]]}: nothing is observed; expected an attribute")
-    return np.asarray(-log_density(network, readings))
+    return -row_log_density(network, readings)
+
+
+def row_log_density(network: Network, readings: Readings) -> Floats:
+    """Return log p of each row (n,).
+
+    Exact, but for rows that observe a group and not its lateral parents: these are averaged over
+    `DRAWS` draws of what is not observed, the same ones for the same row.
+    """
+    out = log_density(network, readings)
+    data = build(readings, network.layout, network.scalings)
+    for i in np.flatnonzero(entangled(network, data)):
+        row = readings.take(np.array([i]))
+        rng = item_generator(0, "density", row.ids[0])
+        weight = draw_given(network, row, DRAWS, rng=rng).log_weight
+        out[i] = np.logaddexp.reduce(weight) - np.log(DRAWS)
+    return out
 
 
 def nothing_observed(readings: Readings) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:

@@ -160,7 +160,7 @@ def spread(cov: Floats, factor: Floats, mask: Masks, index: Ints, size: int, out
 
 
 @compiled
-def moments(
+def moments(  # noqa: C901 - one pass over the rows, compiled
     x: Floats,
     z: Floats,
     order: Ints,

@@ -9,20 +9,24 @@ from typing import Literal
 import numpy as np
 
 from ..artifacts.attributes import Attributes
-from ..artifacts.model import Model, TrainingRows
+from ..artifacts.model import Configuration, Model, TrainingRows
 from ..errors import InvalidInput
-from . import mixture, styles
+from . import variants
 from .coordinates import Readings, read_attributes, stack
 from .dataset import Dataset, Scaling, build, fit_scaling
 from .em import Fit, Prior, Stop, run
 from .groups import GROUPS, Boundary, Group
-from .layout import Layout, building_layout
+from .layout import Layout, building_layout, merged
 from .network import Network, Weights, edges
 from .prior import shipped_prior, unobserved_bits, unobserved_coordinates, weights_with_prior
+from .score import cheeseman_stutz
 from .serialisation import bits_to_model, groups_to_model
+from .structure_search import Limits, Search, Tried, parent_of, search_structure
 
 Variant = Literal["full", "no-lateral", "no-middle", "flat", "gmm"]
 
+LAST_ITERATIONS = 200  # of the winner, after EM has nearly settled
+SEARCH_ROWS = 4000  # of which the structure is searched; EM then sees all
 KEPT_ROWS = 5000  # training rows that a model carries for nearest neighbours
 
 
@@ -65,9 +69,20 @@ def learn_model(
     if len(attributes) < 2:
         raise InvalidInput(f"{len(attributes)} buildings to learn from; expected at least 2")
     problem = prepare(attributes, options)
-    fit = fixed_structure(problem, options)
+    fit, tried = fit_variant(problem, options, rng)
     heights = float(np.median([row.storey_height for row in attributes]))
-    return to_model(problem, fit, options, heights, rng)
+    return to_model(problem, fit, tried, options, heights, rng)
+
+
+def learn_readings(
+    readings: Readings, layout: Layout, *, rng: np.random.Generator, options: LearnOptions
+) -> Model:
+    """Return the model of rows that are no buildings: what nobody observes stays unknown."""
+    if len(readings) < 2:
+        raise InvalidInput(f"{len(readings)} rows to learn from; expected at least 2")
+    problem = problem_of(readings, layout, 0, (), [[] for _ in layout.groups])
+    fit, tried = fit_variant(problem, options, rng)
+    return to_model(problem, fit, tried, options, 1.0, rng)
 
 
 def boundary_of(rows: Sequence[Attributes]) -> Boundary:
@@ -79,6 +94,8 @@ def boundary_of(rows: Sequence[Attributes]) -> Boundary:
 def prepare(attributes: Sequence[Attributes], options: LearnOptions) -> Problem:
     """Return the problem of attribute vectors; prior rows join where something is unobserved."""
     layout = building_layout(boundary_of(attributes), options.groups, plain=options.faithful)
+    if options.variant == "gmm":
+        layout = merged(layout)
     readings = read_attributes(attributes, layout, options.groups)
     missing = unobserved_coordinates(readings, layout)
     bits = unobserved_bits(readings, layout)
@@ -122,31 +139,72 @@ def _scalings(
     return tuple(out)
 
 
-def fixed_structure(problem: Problem, options: LearnOptions, size: int = 4) -> Fit:
-    """Return the model with fixed cardinalities and no lateral edges."""
-    fits = []
-    for g, group in enumerate(problem.layout.groups):
-        task = mixture.Task(
-            problem.data, g, group, problem.scalings[g], problem.weights.groups[g], options.prior
-        )
-        fit = mixture.single(task)
-        while len(fit.family.coef) < size:
-            fit = mixture.grow(task, fit)
-        fits.append(fit)
-    shown = styles.evidence([fit.local for fit in fits])
-    everyone = np.ones((len(problem.data), 1))
-    upper = styles.first(shown, problem.data, problem.weights, options.prior, everyone)
-    while len(upper.style) < size:
-        upper = styles.grow(upper, shown, problem.data, problem.weights, options.prior)
-    families = tuple(
-        replace(fit.family, hidden=hidden) for fit, hidden in zip(fits, upper.hidden, strict=True)
+def fit_variant(
+    problem: Problem, options: LearnOptions, rng: np.random.Generator
+) -> tuple[Fit, list[Tried]]:
+    """Return the fitted network of the variant, and every configuration that was tried."""
+    tried: list[Tried] = []
+    plain = options.faithful or options.variant in ("flat", "gmm")
+    rows = variants.Rows(
+        problem.layout, problem.data, problem.scalings, problem.weights, options.prior, plain
     )
-    network = Network(problem.layout, problem.scalings, upper.style, upper.bits, families)
-    return run(network, problem.data, options.prior, weights=problem.weights, stop=Stop())
+    if options.variant == "no-middle":
+        fit = variants.no_middle(rows, options.largest, tried)
+    elif options.variant == "flat":
+        fit = variants.flat(rows, tried)
+    elif options.variant == "gmm":
+        fit = variants.gmm(rows, options.largest, tried)
+    else:
+        return fit_hierarchical(problem, options, rng)
+    return finished(problem, fit.network, options), tried
+
+
+def fit_hierarchical(
+    problem: Problem, options: LearnOptions, rng: np.random.Generator
+) -> tuple[Fit, list[Tried]]:
+    """Return the best of the searched structures after EM to the end, on all rows."""
+    part = searched_rows(problem, rng)
+    limits = Limits(largest=options.largest, lateral=options.variant != "no-lateral")
+    best: tuple[float, Network] | None = None
+    tried: list[Tried] = []
+    for restart in range(options.restarts):
+        search = Search(part.layout, part.data, part.scalings, part.weights, options.prior, limits)
+        search.tied = options.faithful
+        search.rng = rng if restart else None
+        state = search_structure(search)
+        tried += search.tried
+        if best is None or state.score > best[0]:
+            best = state.score, search.network(state)
+    assert best is not None
+    return finished(problem, best[1], options), tried
+
+
+def searched_rows(problem: Problem, rng: np.random.Generator) -> Problem:
+    """Return the problem of at most `SEARCH_ROWS` training rows, drawn by `rng`, and the prior."""
+    if problem.train <= SEARCH_ROWS:
+        return problem
+    chosen = np.sort(rng.choice(problem.train, SEARCH_ROWS, replace=False))
+    rows = np.concatenate([chosen, np.arange(problem.train, len(problem.readings))])
+    readings, w = problem.readings.take(rows), problem.weights
+    weights = Weights(w.style[rows], tuple(g[rows] for g in w.groups), w.bits[rows])
+    data = build(readings, problem.layout, problem.scalings)
+    return replace(problem, readings=readings, data=data, weights=weights, train=SEARCH_ROWS)
+
+
+def finished(problem: Problem, network: Network, options: LearnOptions) -> Fit:
+    """Return the network after EM until its parameters rest."""
+    stop = Stop(parameters=1e-6, iterations=LAST_ITERATIONS)
+    fit = run(network, problem.data, options.prior, weights=problem.weights, stop=Stop())
+    return run(fit.network, problem.data, options.prior, weights=problem.weights, stop=stop)
 
 
 def to_model(
-    problem: Problem, fit: Fit, options: LearnOptions, height: float, rng: np.random.Generator
+    problem: Problem,
+    fit: Fit,
+    tried: Sequence[Tried],
+    options: LearnOptions,
+    height: float,
+    rng: np.random.Generator,
 ) -> Model:
     """Return the artifact of a fit."""
     network = fit.network
@@ -165,10 +223,37 @@ def to_model(
         faithful=options.faithful,
         cardinalities=sizes,
         edges=tuple(edges(network)),
+        score=cheeseman_stutz(network, problem.data, problem.weights, fit.posterior, options.prior),
+        trace=score_trace(tried),
+        search=tuple(configuration(one, network.layout) for one in tried),
         unobserved=problem.unobserved,
         storey_height=height,
         training=training_rows(problem, rng),
     )
+
+
+def score_trace(tried: Sequence[Tried]) -> tuple[float, ...]:
+    """Return the best score so far after each change of |S|."""
+    out: list[float] = []
+    last, best = -1, -np.inf
+    for one in tried:
+        best = max(best, one.score)
+        if one.style == last:
+            out[-1] = best
+        else:
+            out.append(best)
+        last = one.style
+    return tuple(float(score) for score in out)
+
+
+def configuration(tried: Tried, layout: Layout) -> Configuration:
+    """Return a configuration as it stands in the artifact."""
+    owners = parent_of(layout)
+    pairs = sorted({(g, owners[f]) for g, features in enumerate(tried.inputs) for f in features})
+    names = [group.name for group in layout.groups]
+    bits = [group.name for group in layout.bit_groups]
+    named = tuple((names[p] if p >= 0 else bits[-1 - p], names[g]) for g, p in pairs)
+    return Configuration(tried.style, tried.hidden, tried.score, named)
 
 
 def training_rows(problem: Problem, rng: np.random.Generator) -> TrainingRows:

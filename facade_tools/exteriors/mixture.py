@@ -14,7 +14,7 @@ from .coordinates import Floats
 from .dataset import Dataset, Scaling, floors
 from .em import NOTHING, Prior, maximise, statistics
 from .layout import GroupLayout
-from .network import Family, empty_family, inputs_of, local_log_density, log_, log_sum
+from .network import Family, empty_family, local_log_density, log_, log_sum
 
 CANDIDATES = 3  # clusters that are tried for a split
 TRIAL = 4  # iterations of each trial
@@ -64,9 +64,7 @@ def refit(task: Task, family: Family, clusters: Floats) -> Family:
     """
     if len(family.coef) != clusters.shape[1]:
         fresh = empty_family(task.layout, 1, clusters.shape[1])
-        width = 1 + len(family.inputs)
-        coef = np.zeros((clusters.shape[1], family.coef.shape[1], width))
-        family = replace(fresh, inputs=family.inputs, coef=coef)
+        family = replace(reshaped(fresh, family.inputs), tied=family.tied)
     weight = clusters * task.weight[:, None]
     data = task.data.groups[task.group]
     hidden = weight.sum(axis=0)[None]
@@ -88,11 +86,18 @@ def improve(task: Task, start: Local, iterations: int, tolerance: float = 1e-5) 
     return fit
 
 
-def single(task: Task, inputs: tuple[int, ...] = ()) -> Local:
+def reshaped(family: Family, inputs: tuple[int, ...]) -> Family:
+    """Return the family with other lateral inputs, their slopes 0."""
+    clusters, d = family.coef.shape[:2]
+    coef = np.zeros((clusters, d, 1 + len(inputs)))
+    coef[:, :, 0] = family.coef[:, :, 0]
+    return replace(family, inputs=inputs, coef=coef)
+
+
+def single(task: Task, inputs: tuple[int, ...] = (), *, tied: bool = False) -> Local:
     """Return the fit with one cluster."""
-    family = empty_family(task.layout, 1, 1)
-    coef = np.zeros((1, family.coef.shape[1], 1 + len(inputs)))
-    family = replace(family, inputs=inputs, coef=coef)
+    family = reshaped(empty_family(task.layout, 1, 1), inputs)
+    family = replace(family, tied=tied)
     return improve(task, evaluate(task, family), 20)
 
 
@@ -120,7 +125,7 @@ def split(task: Task, clusters: Floats, k: int) -> Floats:
     w = clusters[:, k] * task.weight
     mean = w @ shown / max(float(w.sum()), NOTHING)
     centred = shown - mean
-    values, vectors = np.linalg.eigh((centred * w[:, None]).T @ centred)
+    _, vectors = np.linalg.eigh((centred * w[:, None]).T @ centred)
     side = centred @ vectors[:, -1] > 0
     first, second = clusters[:, k] * side, clusters[:, k] * ~side
     blend = 0.1 * clusters[:, k]  # both halves keep a little of everything

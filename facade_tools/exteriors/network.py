@@ -20,7 +20,8 @@ class Family:
 
     hidden (|S|, K): P(H | S); of a group that hangs on S itself, the unit matrix and `direct`.
     tables: P(state | H) a channel, (K, states). inputs: features of other groups, by number.
-    coef (K, d, 1 + inputs), cov (K, d, d): conditional linear Gaussian, standardised.
+    coef (K, d, 1 + inputs), cov (K, d, d): conditional linear Gaussian, standardised. tied: the
+    tables are the same for every cluster (variants without atoms of their own).
     """
 
     hidden: Floats
@@ -29,6 +30,7 @@ class Family:
     coef: Floats
     cov: Floats
     direct: bool = False
+    tied: bool = False
 
 
 @dataclass(frozen=True, slots=True)

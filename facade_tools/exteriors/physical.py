@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .coordinates import UNSEEN, Bits, Floats, Readings
+from .coordinates import Bits, Floats
 from .groups import ABSENT, ATOM_TOLERANCE
 from .layout import Layout
 
@@ -100,8 +100,3 @@ def _garage(columns: Columns, held: Columns | None) -> None:
             room = np.clip(np.minimum(at, 1 - at), 1e-3, 0.5)
             needed = np.where(here, garage / (2 * room), 0.0)
         _put(house, np.where(needed > house * (1 + 1e-12), needed, house), held, size)
-
-
-def unknown_states(values: Floats, states: Bits) -> Bits:
-    """Return states with what does not exist marked unseen."""
-    return np.where(np.isfinite(values), states, UNSEEN)

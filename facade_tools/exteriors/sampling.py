@@ -36,10 +36,10 @@ def draw_blocks(
 
 def draw_block(network: Network, *, rng: np.random.Generator, style: int | None = None) -> Draws:
     """Return one block of ancestral draws, moved onto what is possible."""
-    styles = _pick(np.tile(network.style, (BLOCK, 1)), rng)
+    styles = pick(np.tile(network.style, (BLOCK, 1)), rng)
     if style is not None:
         styles = np.full(BLOCK, style)
-    bits = _draw_bits(network, styles, rng)
+    bits = draw_bits(network, styles, rng)
     drawn = draw_groups(network, styles, rng)
     values = tuple(v for v, _ in drawn)
     parts = tuple(p for _, p in drawn)
@@ -47,7 +47,7 @@ def draw_block(network: Network, *, rng: np.random.Generator, style: int | None 
     return Draws(Readings(("",) * BLOCK, values, parts, bits), styles)
 
 
-def _pick(probabilities: Floats, rng: np.random.Generator) -> Ints:
+def pick(probabilities: Floats, rng: np.random.Generator) -> Ints:
     """Return one index a row of probabilities."""
     u = rng.random((len(probabilities), 1))
     cumulative = np.cumsum(probabilities, axis=1)
@@ -55,15 +55,23 @@ def _pick(probabilities: Floats, rng: np.random.Generator) -> Ints:
     return np.minimum(index, probabilities.shape[1] - 1)
 
 
-def _draw_bits(network: Network, styles: Ints, rng: np.random.Generator) -> Bits:
-    """Return bits (n, b); every building has at least one kind of roof."""
+def draw_bits(
+    network: Network, styles: Ints, rng: np.random.Generator, known: Bits | None = None
+) -> Bits:
+    """Return bits (n, b), those of `known` (b,) kept; every building has some kind of roof."""
     probability = network.bits[styles]
     bits = (rng.random(probability.shape) < probability).astype(np.int8)
+    if known is not None:
+        bits[:, known >= 0] = known[known >= 0]
     roofs = [i for i, name in enumerate(network.layout.bits) if name.startswith("roof.")]
     if roofs:
         words = np.array(list(product((0, 1), repeat=len(roofs)))[1:], dtype=np.int8)
-        odds = np.exp(bit_log_density(probability[:, roofs], words)).T + 1e-300
-        bits[:, roofs] = words[_pick(odds / odds.sum(axis=1, keepdims=True), rng)]
+        if known is not None:
+            seen = known[roofs]
+            words = words[((words == seen) | (seen < 0)).all(axis=1)]
+        if len(words):
+            odds = np.exp(bit_log_density(probability[:, roofs], words)).T + 1e-300
+            bits[:, roofs] = words[pick(odds / odds.sum(axis=1, keepdims=True), rng)]
     return bits
 
 
@@ -76,15 +84,15 @@ def draw_groups(
     out: dict[int, tuple[Floats, Bits]] = {}
     for g in topological(network.families, layout):
         family, group = network.families[g], layout.groups[g]
-        clusters = styles if family.direct else _pick(family.hidden[styles], rng)
+        clusters = styles if family.direct else pick(family.hidden[styles], rng)
         states = np.stack(
-            [_pick(table[clusters], rng) for table in family.tables] or [np.zeros(count)], axis=1
+            [pick(table[clusters], rng) for table in family.tables] or [np.zeros(count)], axis=1
         ).astype(np.int8)[:, : len(family.tables)]
         x = draw_normal(family, clusters, shown, rng)
         values = values_of(own_units(x, group, network.scalings[g]), states, group)
         if group.name == "arf" and "r1" in layout.features:
             values[_flat(layout, shown)] = ABSENT
-        show(shown, x, values, states, group, layout, g)
+        show(shown, x, values, states, layout, g)
         out[g] = (values, _parts(states, group))
     return [out[g] for g in range(len(layout.groups))]
 
@@ -109,11 +117,9 @@ def draw_normal(family: Family, clusters: Ints, shown: Floats, rng: np.random.Ge
     return np.asarray(mean + np.einsum("nde,ne->nd", factor[clusters], noise))
 
 
-def show(
-    shown: Floats, x: Floats, values: Floats, states: Bits, group: GroupLayout,
-    layout: Layout, g: int,
-) -> None:  # fmt: skip
+def show(shown: Floats, x: Floats, values: Floats, states: Bits, layout: Layout, g: int) -> None:
     """Write what children see of group g into `shown` (as `dataset` does for data)."""
+    group = layout.groups[g]
     at = layout.feature_group.index(g) if group.features else 0
     for i, channel in enumerate(group.channel_of):
         dense = np.isfinite(values[:, i])

@@ -1,115 +1,217 @@
-"""The upper half of the network by itself: S and the tables P(H | S), families held fixed."""
+"""The upper half of the network by itself: S, its bits and P(H | S), the families held fixed."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .coordinates import Floats
-from .em import NOTHING, Prior, fit_bits, fit_table
-from .network import Weights, bit_log_density, log_, log_sum
+from ..compiled import compiled
+from .coordinates import Bits, Floats
 from .dataset import Dataset
+from .em import NOTHING, Prior, fit_table
+from .network import Weights
+
+Ints = NDArray[np.int64]
+
+SMALL = 1e-200  # a product below it goes into the logarithm before it vanishes
+TRIALS = 2  # styles that are tried for a cut
+TRIAL = 5  # iterations of each
 
 
-@dataclass(frozen=True, slots=True)
-class Upper:
-    """P(S), P(bit | S), P(H | S) a group, and the posterior of S (n, |S|) with its density."""
+@compiled
+def upper_pass(  # noqa: C901 - one pass over the rows, compiled: calls would cost what it saves
+    likelihood: Floats,
+    starts: Ints,
+    hidden: Floats,
+    style: Floats,
+    bits: Bits,
+    one: Floats,
+    weight: Floats,
+    density: Floats,
+    posterior: Floats,
+    counts: Floats,
+) -> None:
+    """E-step of the upper half.
 
-    style: Floats
-    bits: Floats
-    hidden: tuple[Floats, ...]
-    posterior: Floats
-    log_density: Floats
+    likelihood (n, ΣK): group g owns columns starts[g]:starts[g + 1]; hidden (|S|, ΣK); bits (n, b),
+    one (|S|, b) their probabilities; weight (n, groups). Written: log density (n,), posterior
+    (n, |S|), counts (|S|, ΣK): Σ weight · P(S, H | row).
+    """
+    n_styles, groups = style.shape[0], starts.shape[0] - 1
+    sums = np.empty((n_styles, groups))
+    logs = np.empty(n_styles)
+    counts[:] = 0.0
+    for n in range(likelihood.shape[0]):
+        top = -np.inf
+        for s in range(n_styles):
+            product, total = style[s], 0.0
+            for b in range(bits.shape[1]):
+                if bits[n, b] == 1:
+                    product *= one[s, b]
+                elif bits[n, b] == 0:
+                    product *= 1.0 - one[s, b]
+            for g in range(groups):
+                mass = 1e-290
+                for k in range(starts[g], starts[g + 1]):
+                    mass += hidden[s, k] * likelihood[n, k]
+                sums[s, g] = mass
+                if product < SMALL:
+                    total += np.log(product)
+                    product = 1.0
+                product *= mass
+            logs[s] = total + np.log(product)
+            top = max(top, logs[s])
+        norm = 0.0
+        for s in range(n_styles):
+            posterior[n, s] = np.exp(logs[s] - top)
+            norm += posterior[n, s]
+        density[n] = top + np.log(norm)
+        for s in range(n_styles):
+            posterior[n, s] /= norm
+            if posterior[n, s] > 1e-8:
+                for g in range(groups):
+                    share = posterior[n, s] * weight[n, g] / sums[s, g]
+                    for k in range(starts[g], starts[g + 1]):
+                        counts[s, k] += share * hidden[s, k] * likelihood[n, k]
 
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """exp(log P(group | H) − top) (n, K) and top (n,) of every group."""
+    """exp(log P(group | H) − top) (n, ΣK), groups side by side; top (n,) summed over groups."""
 
-    likelihood: tuple[Floats, ...]
-    top: tuple[Floats, ...]
-
-
-def evidence(locals_: list[Floats]) -> Evidence:
-    """Return the evidence of log P(group | H) tables."""
-    tops = tuple(table.max(axis=1) for table in locals_)
-    scaled = tuple(np.exp(t - top[:, None]) for t, top in zip(locals_, tops, strict=True))
-    return Evidence(scaled, tops)
+    likelihood: Floats
+    starts: Ints
+    top: Floats
 
 
-def first(
-    shown: Evidence, data: Dataset, weights: Weights, prior: Prior, posterior: Floats
-) -> Upper:
-    """Return the upper half after an M-step from a posterior of S alone."""
-    hidden = []
-    for likelihood, weight in zip(shown.likelihood, weights.groups, strict=True):
-        share = likelihood / np.maximum(likelihood.sum(axis=1, keepdims=True), NOTHING)
-        hidden.append(fit_table((posterior * weight[:, None]).T @ share, prior.hidden))
-    style = fit_table(weights.style @ posterior, prior.style)
-    bits = fit_bits(data, weights, posterior, prior)
-    return _expect(style, bits, tuple(hidden), shown, data)
+@dataclass(frozen=True, slots=True)
+class Upper:
+    """P(S), P(bit | S), P(H | S) side by side (|S|, ΣK), and what the E-step says of the rows."""
+
+    style: Floats
+    bits: Floats
+    hidden: Floats
+    posterior: Floats
+    log_density: Floats
+    counts: Floats
 
 
-def _expect(
-    style: Floats, bits: Floats, hidden: tuple[Floats, ...], shown: Evidence, data: Dataset
-) -> Upper:
-    joint = bit_log_density(bits, data.bits) + log_(style)
-    for table, likelihood, top in zip(hidden, shown.likelihood, shown.top, strict=True):
-        joint += log_(likelihood @ table.T) + top[:, None]
-    density = log_sum(joint)
-    return Upper(style, bits, hidden, np.exp(joint - density[:, None]), density)
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """What does not change while the upper half is fitted: bits, weights and priors."""
+
+    bits: Bits
+    one: Floats
+    zero: Floats
+    style_weight: Floats
+    group_weight: Floats
+    prior: Prior
 
 
-def iterate(upper: Upper, shown: Evidence, data: Dataset, weights: Weights, prior: Prior) -> Upper:
-    """Return the upper half after one EM iteration."""
-    hidden = tuple(
-        fit_table(hidden_counts(table, likelihood, upper.posterior, weight), prior.hidden)
-        for table, likelihood, weight in zip(
-            upper.hidden, shown.likelihood, weights.groups, strict=True
-        )
+def rows_of(data: Dataset, weights: Weights, prior: Prior) -> Rows:
+    """Return the fixed part of the rows."""
+    return Rows(
+        data.bits,
+        weights.bits * (data.bits == 1),
+        weights.bits * (data.bits == 0),
+        weights.style,
+        np.ascontiguousarray(np.stack(weights.groups, axis=1)),
+        prior,
     )
-    style = fit_table(weights.style @ upper.posterior, prior.style)
-    bits = fit_bits(data, weights, upper.posterior, prior)
-    return _expect(style, bits, hidden, shown, data)
 
 
-def hidden_counts(table: Floats, likelihood: Floats, posterior: Floats, weight: Floats) -> Floats:
-    """Return Σ weight · P(S, H | row), (|S|, K)."""
-    share = posterior * weight[:, None] / np.maximum(likelihood @ table.T, 1e-290)
-    return np.asarray(table * (share.T @ likelihood))
+def evidence(locals_: list[tuple[Floats, Floats]]) -> Evidence:
+    """Return the evidence of scaled likelihoods (n, K) and their logarithmic tops (n,)."""
+    starts = np.cumsum([0, *(table.shape[1] for table, _ in locals_)]).astype(np.int64)
+    likelihood = np.ascontiguousarray(np.concatenate([table for table, _ in locals_], axis=1))
+    return Evidence(likelihood, starts, np.sum([top for _, top in locals_], axis=0))
+
+
+def scaled(local: Floats) -> tuple[Floats, Floats]:
+    """Return exp(local − top) and top, the largest of each row."""
+    top = local.max(axis=1)
+    return np.exp(local - top[:, None]), top
+
+
+def expect(rows: Rows, shown: Evidence, style: Floats, bits: Floats, hidden: Floats) -> Upper:
+    """Return the upper half after an E-step."""
+    n, styles = len(rows.bits), len(style)
+    density, posterior = np.empty(n), np.empty((n, styles))
+    counts = np.empty(hidden.shape)
+    upper_pass(
+        shown.likelihood, shown.starts, hidden, style, rows.bits, bits, rows.group_weight,
+        density, posterior, counts,
+    )  # fmt: skip
+    return Upper(style, bits, hidden, posterior, density + shown.top, counts)
+
+
+def normalised(counts: Floats, starts: Ints, strength: float) -> Floats:
+    """Return MAP tables of side-by-side counts: each group's columns sum to 1."""
+    parts = [fit_table(counts[:, a:b], strength) for a, b in pairwise(starts)]
+    return np.ascontiguousarray(np.concatenate(parts, axis=1))
+
+
+def bit_counts(rows: Rows, posterior: Floats) -> tuple[Floats, Floats]:
+    """Return expected counts of ones and zeros, (|S|, b) each."""
+    return posterior.T @ rows.one, posterior.T @ rows.zero
+
+
+def maximise(rows: Rows, shown: Evidence, posterior: Floats, counts: Floats) -> Upper:
+    """Return the upper half after an M-step, and the E-step that follows it."""
+    one, zero = bit_counts(rows, posterior)
+    bits = (one + rows.prior.bit / 2) / (one + zero + rows.prior.bit)
+    style = fit_table(rows.style_weight @ posterior, rows.prior.style)
+    hidden = normalised(counts, shown.starts, rows.prior.hidden)
+    return expect(rows, shown, style, np.asarray(bits), hidden)
+
+
+def first(rows: Rows, shown: Evidence, posterior: Floats) -> Upper:
+    """Return the upper half from a posterior of S alone."""
+    share = profile(shown)
+    starts = shown.starts
+    parts = [
+        (posterior * rows.group_weight[:, [g]]).T @ share[:, starts[g] : starts[g + 1]]
+        for g in range(len(starts) - 1)
+    ]
+    return maximise(rows, shown, posterior, np.concatenate(parts, axis=1))
+
+
+def profile(shown: Evidence) -> Floats:
+    """Return P(H | group) under even shares, (n, ΣK)."""
+    sums = np.add.reduceat(shown.likelihood, shown.starts[:-1], axis=1)
+    wide = np.repeat(np.maximum(sums, NOTHING), np.diff(shown.starts), axis=1)
+    return np.asarray(shown.likelihood / wide)
 
 
 def improve(
-    upper: Upper, shown: Evidence, data: Dataset, weights: Weights, prior: Prior,
-    iterations: int = 30, tolerance: float = 1e-5,
-) -> Upper:  # fmt: skip
+    rows: Rows, shown: Evidence, upper: Upper, iterations: int = 30, tolerance: float = 1e-5
+) -> Upper:
     """Run EM on the upper half until the log likelihood changes little, relatively."""
     for _ in range(iterations):
-        after = iterate(upper, shown, data, weights, prior)
-        change = weights.style @ (after.log_density - upper.log_density)
+        after = maximise(rows, shown, upper.posterior, upper.counts)
+        change = rows.style_weight @ (after.log_density - upper.log_density)
         upper = after
-        if abs(change) <= tolerance * abs(weights.style @ upper.log_density):
+        if abs(change) <= tolerance * abs(rows.style_weight @ upper.log_density):
             break
     return upper
 
 
-def grow(upper: Upper, shown: Evidence, data: Dataset, weights: Weights, prior: Prior) -> Upper:
-    """Return the upper half with one style more: the heaviest style is cut in two."""
-    profile = [
-        likelihood / np.maximum(likelihood.sum(axis=1, keepdims=True), NOTHING)
-        for likelihood in shown.likelihood
-    ]
-    look = np.concatenate([*profile, np.maximum(data.bits, 0)], axis=1)
+def grow(rows: Rows, shown: Evidence, upper: Upper) -> Upper:
+    """Return the upper half with one style more: a heavy style is cut in two."""
+    look = np.concatenate([profile(shown), np.maximum(rows.bits, 0)], axis=1)
+    heavy = np.argsort(-(rows.style_weight @ upper.posterior))[:TRIALS]
     trials = []
-    for k in np.argsort(-(weights.style @ upper.posterior))[:2]:
-        cut = _cut(upper.posterior, look, weights.style, int(k))
-        start = first(shown, data, weights, prior, cut)
-        trials.append(improve(start, shown, data, weights, prior, iterations=6))
-    return max(trials, key=lambda trial: float(weights.style @ trial.log_density))
+    for k in heavy:
+        start = first(rows, shown, cut(upper.posterior, look, rows.style_weight, int(k)))
+        trials.append(improve(rows, shown, start, TRIAL))
+    return max(trials, key=lambda trial: float(rows.style_weight @ trial.log_density))
 
 
-def _cut(posterior: Floats, look: Floats, weight: Floats, k: int) -> Floats:
+def cut(posterior: Floats, look: Floats, weight: Floats, k: int) -> Floats:
+    """Return the posterior with style k cut across the direction in which its rows differ most."""
     w = posterior[:, k] * weight
     centred = look - w @ look / max(float(w.sum()), NOTHING)
     _, vectors = np.linalg.eigh((centred * w[:, None]).T @ centred)

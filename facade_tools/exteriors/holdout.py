@@ -1,0 +1,79 @@
+"""The paper's comparison (FW16 Fig. 12): variants on the same random splits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..artifacts.attributes import Attributes
+from ..randomness import item_generator
+from .evaluation import negative_log_density
+from .learning import LearnOptions, Variant, learn_model
+
+VARIANTS: tuple[Variant, ...] = ("full", "no-lateral", "no-middle", "flat", "gmm")
+TEST_SHARE = 0.2
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """One variant: held-out mean NLL, and the paired difference to the first variant, nats."""
+
+    variant: str
+    nll: float
+    error: float
+    difference: float
+    difference_error: float
+    rows: int
+
+
+def splits(count: int, repeats: int, seed: int) -> Iterator[tuple[list[int], list[int]]]:
+    """Yield training and test rows of random 80/20 splits."""
+    for repeat in range(repeats):
+        order = item_generator(seed, "holdout", repeat).permutation(count).tolist()
+        cut = max(1, round(count * TEST_SHARE))
+        yield order[cut:], order[:cut]
+
+
+def compare_variants(
+    rows: Sequence[Attributes],
+    repeats: int,
+    *,
+    seed: int = 0,
+    options: LearnOptions = LearnOptions(),
+    variants: Sequence[Variant] = VARIANTS,
+) -> tuple[Comparison, ...]:
+    """Return the held-out comparison of variants, each on the same splits."""
+    found: dict[str, list[np.ndarray[tuple[int], np.dtype[np.float64]]]] = {v: [] for v in variants}
+    for train, test in splits(len(rows), repeats, seed):
+        for variant in variants:
+            rng = item_generator(seed, "holdout", variant)
+            chosen = replace(options, variant=variant)
+            model = learn_model([rows[i] for i in train], rng=rng, options=chosen)
+            found[variant].append(negative_log_density(model, [rows[i] for i in test]))
+    first = np.concatenate(found[variants[0]])
+    return tuple(_compared(v, np.concatenate(found[v]), first) for v in variants)
+
+
+def _compared(variant: str, nll: np.ndarray, first: np.ndarray) -> Comparison:  # type: ignore[type-arg]
+    root = float(np.sqrt(len(nll)))
+    gap = nll - first
+    return Comparison(
+        variant,
+        float(nll.mean()),
+        float(nll.std()) / root,
+        float(gap.mean()),
+        float(gap.std()) / root,
+        len(nll),
+    )
+
+
+def table_lines(table: Sequence[Comparison]) -> Iterator[str]:
+    """Yield the comparison as lines of text."""
+    yield f"{'variant':<12} {'nll':>9} {'s.e.':>7} {'difference':>11} {'s.e.':>7}"
+    for row in table:
+        yield (
+            f"{row.variant:<12} {row.nll:9.3f} {row.error:7.3f} "
+            f"{row.difference:11.3f} {row.difference_error:7.3f}"
+        )

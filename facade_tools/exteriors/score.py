@@ -1,0 +1,107 @@
+"""The Cheeseman-Stutz score (FW16 eq. 2) and its parts.
+
+log P(O*|G) + log P(O|G, Θ) − log P(O*|G, Θ), O* the expected complete data. Every part of the
+network adds its own `marginal − complete`; only log P(O|G, Θ) needs them all.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.special import gammaln, multigammaln
+
+from .coordinates import Floats
+from .dataset import Dataset
+from .em import Prior, Statistics, prior_precision, statistics, wishart_scale
+from .network import Family, Network, Posterior, Weights, log_
+
+LOG_2PI = float(np.log(2 * np.pi))
+
+
+def table_part(counts: Floats, p: Floats, strength: float) -> float:
+    """Return log marginal minus log likelihood of expected counts (rows of tables).
+
+    The marginal is under Dirichlet(1 + strength/m), whose mode `em.fit_table` takes.
+    """
+    alpha = 1.0 + strength / counts.shape[-1]
+    m = counts.shape[-1]
+    total = counts.sum(axis=-1)
+    marginal = gammaln(m * alpha) - gammaln(m * alpha + total)
+    marginal = marginal + (gammaln(alpha + counts) - gammaln(alpha)).sum(axis=-1)
+    return float(np.sum(marginal) - np.sum(counts * log_(p)))
+
+
+def gaussian_part(stats: Statistics, family: Family, prior: Prior) -> float:
+    """Return log marginal minus log likelihood of expected moments, all clusters."""
+    if family.coef.shape[1] == 0:
+        return 0.0
+    return float((log_marginal(stats, prior) - log_complete(stats, family)).sum())
+
+
+def log_marginal(stats: Statistics, prior: Prior) -> Floats:
+    """Return the log marginal likelihood (K,) under the matrix-normal inverse-Wishart prior."""
+    d, width = stats.xu.shape[1:]
+    rows = stats.uu[:, 0, 0]
+    precision = np.diag(prior_precision(width, prior))
+    after = stats.uu + precision
+    coef = np.linalg.solve(after, stats.xu.swapaxes(1, 2)).swapaxes(1, 2)
+    scale = wishart_scale(d, prior)
+    scatter = scale + stats.xx - coef @ after @ coef.swapaxes(1, 2)
+    freedom = d + prior.freedom
+    return np.asarray(
+        -0.5 * rows * d * np.log(np.pi)
+        + 0.5 * d * (_logdet(precision) - _logdet(after))
+        + 0.5 * freedom * _logdet(scale)
+        - 0.5 * (freedom + rows) * _logdet(scatter)
+        + multigammaln((freedom + rows) / 2, d)
+        - multigammaln(freedom / 2, d)
+    )
+
+
+def log_complete(stats: Statistics, family: Family) -> Floats:
+    """Return the expected complete log likelihood (K,) of the moments."""
+    d = stats.xu.shape[1]
+    rows = stats.uu[:, 0, 0]
+    cross = family.coef @ stats.xu.swapaxes(1, 2)
+    scatter = stats.xx - cross - cross.swapaxes(1, 2)
+    scatter = scatter + family.coef @ stats.uu @ family.coef.swapaxes(1, 2)
+    trace = np.trace(np.linalg.solve(family.cov, scatter), axis1=1, axis2=2)
+    return np.asarray(-0.5 * (rows * (d * LOG_2PI + _logdet(family.cov)) + trace))
+
+
+def _logdet(a: Floats) -> Floats:
+    return np.asarray(np.linalg.slogdet(a)[1])
+
+
+def family_part(stats: Statistics, family: Family, prior: Prior) -> float:
+    """Return marginal minus complete of a family's Gaussians and atom tables."""
+    total = gaussian_part(stats, family, prior)
+    for counts, table in zip(stats.tables, family.tables, strict=True):
+        if family.tied:
+            total += table_part(counts.sum(axis=0), table[0], prior.table)
+        else:
+            total += table_part(counts, table, prior.table)
+    return total
+
+
+def bits_part(data: Dataset, weights: Weights, style: Floats, p: Floats, prior: Prior) -> float:
+    """Return marginal minus complete of the bits given S."""
+    one = style.T @ (weights.bits * (data.bits == 1))
+    zero = style.T @ (weights.bits * (data.bits == 0))
+    counts = np.stack([one, zero], axis=-1)
+    return table_part(counts, np.stack([p, 1 - p], axis=-1), prior.bit)
+
+
+def cheeseman_stutz(
+    network: Network, data: Dataset, weights: Weights, posterior: Posterior, prior: Prior
+) -> float:
+    """Return the score of a network at its parameters, from its own E-step, in nats."""
+    total = float(weights.style @ posterior.log_density)
+    total += table_part(weights.style @ posterior.style, network.style, prior.style)
+    total += bits_part(data, weights, posterior.style, network.bits, prior)
+    for g, family in enumerate(network.families):
+        weight = posterior.clusters[g] * weights.groups[g][:, None]
+        stats = statistics(family, data.groups[g], data.features, weight, posterior.joint[g])
+        total += family_part(stats, family, prior)
+        if not family.direct:
+            total += table_part(posterior.joint[g], family.hidden, prior.hidden)
+    return total

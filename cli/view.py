@@ -13,6 +13,7 @@ from ._options import StreamOptions, stream_options
 DRAWINGS = {
     "building": "facade_tools.geometry.details:building_scene",
     "footprint": "facade_tools.geometry.details:footprint_scene",
+    "layout": "facade_tools.layering.drawing:layout_picture",
     "attributes": "facade_tools.imaging.attribute_glyphs:attribute_glyph",
 }
 

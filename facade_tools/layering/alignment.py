@@ -64,6 +64,11 @@ class _Node:
     forbidden: tuple[tuple[int, ...], ...]  # of every group
     parent: Borders = ()  # the path that it was branched from
 
+    @property
+    def signature(self) -> tuple[Any, ...]:
+        """Return what two nodes with the same alignments share."""
+        return tuple(sorted(self.box.items())), tuple(map(frozenset, self.forbidden))
+
 
 def key_of(alignment: Alignment, canvas: float) -> Key:
     """Return what alignments are ordered by: Ω, pieces, columns, |Σ − canvas|, names."""
@@ -109,6 +114,7 @@ class Aligner:
         box = {name: (low, high) for name, low, high in task.candidate.unsized}
         root = _Node(box, ((),) * len(task.candidate.parts))
         order = count()
+        seen = {root.signature}
         queue: list[tuple[Key, int, Alignment, _Node | None]] = []
         complete = self._push(queue, order, root, task)
         for _ in range(task.effort.nodes):
@@ -124,7 +130,9 @@ class Aligner:
                 key = full_key(exact, self.direction.canvas)
                 heapq.heappush(queue, (key, next(order), exact, None))
             for child in children:
-                complete &= self._push(queue, order, child, task)
+                if child.signature not in seen:
+                    seen.add(child.signature)
+                    complete &= self._push(queue, order, child, task)
         return self._cut(queue)
 
     def _cut(self, queue: list[tuple[Key, int, Alignment, _Node | None]]) -> Found:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -51,11 +52,12 @@ PLANS = tuple(_PLANS)
 
 
 def plan_building(plan: str, roof: Roof, height: float = 6.0) -> Building:
-    """A building of one height on a named plan, the same roof on every box."""
-    boxes = [
-        box(f"box-{k}", rectangle, height, roof=roof)
-        for k, rectangle in enumerate(rectangles(plan))
-    ]
+    """A building of one height on a named plan; ridges run along the longer sides, sheds across."""
+    boxes = []
+    for k, (x0, y0, x1, y1) in enumerate(rectangles(plan)):
+        along = "x" if (x1 - x0 >= y1 - y0) != (roof.style == "shed") else "y"
+        own = replace(roof, direction=along)
+        boxes.append(box(f"box-{k}", (x0, y0, x1, y1), height, roof=own))
     return Building(f"{plan}-{roof.style}", tuple(boxes))
 
 

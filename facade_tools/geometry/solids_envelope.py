@@ -219,5 +219,5 @@ def _line_of(start: Points2, end: Points2) -> tuple[float, float, float]:
     """Return the unit normal and offset of the line, rounded, equal for pieces of one wall."""
     (x0, y0), (x1, y1) = start.tolist(), end.tolist()
     length = math.hypot(x1 - x0, y1 - y0)
-    a, b = round((y1 - y0) / length, 4), round((x0 - x1) / length, 4)
-    return a, b, round(a * x0 + b * y0, 3)
+    a, b = round((y1 - y0) / length, 5), round((x0 - x1) / length, 5)
+    return a, b, round(a * x0 + b * y0, 4)

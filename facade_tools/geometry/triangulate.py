@@ -30,7 +30,7 @@ def triangulate_rings(rings: Sequence[Points2]) -> Triangles:
 
     rings: an outer ring, then holes, none closed. No point is added and every edge of a ring
     is an edge of exactly one triangle, also where points lie in one line (earcut alone drops
-    such points).
+    such points). Points at one place, where rings touch, are taken as one.
     """
     points = np.ascontiguousarray(np.concatenate(rings), dtype=np.float64)
     ends = np.cumsum([len(ring) for ring in rings]).astype(np.uint32)
@@ -38,11 +38,19 @@ def triangulate_rings(rings: Sequence[Points2]) -> Triangles:
     found = np.asarray(mapbox_earcut.triangulate_float64(points, ends), dtype=np.int64)
     triangles = found.reshape(-1, 3)
     if len(triangles) != len(points) + 2 * len(rings) - 4:
-        triangles = _conforming(points, triangles)
+        triangles = _conforming(points, _without_copies(points, triangles))
     a, b, c = (points[triangles[:, k]] for k in range(3))
     turned = _cross(b - a, c - a) < 0
     triangles[turned] = triangles[turned][:, ::-1]
     return triangles
+
+
+def _without_copies(points: Points2, triangles: Triangles) -> Triangles:
+    """Let points at one place be one (where rings touch), and drop triangles that vanish."""
+    _, first, place = np.unique(points, axis=0, return_index=True, return_inverse=True)
+    triangles = first[place.ravel()][triangles]
+    a, b, c = triangles.T
+    return np.asarray(triangles[(a != b) & (b != c) & (c != a)], dtype=np.int64)
 
 
 def _cross(a: Points2, b: Points2) -> Floats:
@@ -54,11 +62,12 @@ def _conforming(points: Points2, triangles: Triangles) -> Triangles:
     a, b, c = (points[triangles[:, k]] for k in range(3))
     reach = np.maximum(((b - a) ** 2).sum(axis=1), ((c - a) ** 2).sum(axis=1))
     flat = np.abs(_cross(b - a, c - a)) <= 1e-9 * reach
+    _, first = np.unique(points, axis=0, return_index=True)
     pending = [tuple(row) for row in triangles[~flat].tolist()]
     done = []
     while pending:
         triangle = pending.pop()
-        halves = _split(points, triangle)
+        halves = _split(points, triangle, first)
         if halves:
             pending += halves
         else:
@@ -66,19 +75,21 @@ def _conforming(points: Points2, triangles: Triangles) -> Triangles:
     return np.array(done, dtype=np.int64).reshape(-1, 3)
 
 
-def _split(points: Points2, triangle: tuple[int, ...]) -> list[tuple[int, ...]]:
-    """Return the two halves of a triangle at the first point inside one of its edges."""
+def _split(
+    points: Points2, triangle: tuple[int, ...], candidates: Integers
+) -> list[tuple[int, ...]]:
+    """Return the two halves of a triangle at the first candidate inside one of its edges."""
     for k in range(3):
         a, b, c = triangle[k], triangle[(k + 1) % 3], triangle[(k + 2) % 3]
         edge = points[b] - points[a]
         length = float(edge @ edge)
-        offset = points - points[a]
+        offset = points[candidates] - points[a]
         along = offset @ edge / length
         aside = np.abs(offset[:, 0] * edge[1] - offset[:, 1] * edge[0])
         inside = (along > 0) & (along < 1) & (aside <= 1e-9 * length)
-        inside[[a, b, c]] = False
+        inside &= (candidates != a) & (candidates != b) & (candidates != c)
         if inside.any():
-            middle = int(np.flatnonzero(inside)[0])
+            middle = int(candidates[np.flatnonzero(inside)[0]])
             return [(a, middle, c), (middle, b, c)]
     return []
 

@@ -75,10 +75,12 @@ def widths(side: Side, genome: Floats, counts: Integers) -> Floats:
     walls allow; the total area of the side is the target ratio's. Doors keep their width.
     """
     k = len(side.subs)
-    number, tall = np.zeros(k), np.zeros(k)
-    low, high = side.subs[:, LOW].copy(), WIDE * side.subs[:, WIDTH]
-    area = 0.0
+    number, tall, high = np.zeros(k), np.zeros(k), np.empty(k)
+    out = np.empty(k)
+    for sub in range(k):
+        out[sub], high[sub] = side.subs[sub, WIDTH], WIDE * side.subs[sub, WIDTH]
     wall = 0.0
+    total = 0.0  # glass that is wanted beside what stands
     for p in range(len(side.pieces)):
         wall += side.pieces[p, 4] * side.pieces[p, 5]
         for e in range(counts[p]):
@@ -87,32 +89,54 @@ def widths(side: Side, genome: Floats, counts: Integers) -> Floats:
             tall[sub] += genome[p, e, TALL]
             high[sub] = min(high[sub], genome[p, e, CLEAR])
     for e in range(len(side.fixed)):
-        area += side.fixed[e, 3] * side.fixed[e, 4]
-    out = side.subs[:, WIDTH].copy()
-    if np.isnan(side.targets[0]):
-        return np.minimum(out, np.maximum(low, high))
+        total -= side.fixed[e, 3] * side.fixed[e, 4]
     for sub in range(k):
         if side.subs[sub, DOOR] > 0.0:
-            area += out[sub] * tall[sub]
+            total -= out[sub] * tall[sub]
             number[sub] = 0.0
-    used = np.flatnonzero(number > 0.0)
-    total = side.targets[0] * wall - area
-    top = np.maximum(low, high)
-    out[used] = sized(out[used], tall[used], number[used], low[used], top[used], total)
+    if np.isnan(side.targets[0]):
+        for sub in range(k):
+            out[sub] = min(out[sub], max(high[sub], side.subs[sub, LOW]))
+        return out
+    return _sized_used(side, out, number, tall, high, total + side.targets[0] * wall)
+
+
+@compiled
+def _sized_used(
+    side: Side, out: Floats, number: Floats, tall: Floats, high: Floats, total: float
+) -> Floats:
+    """Size the substyles that occur, `number` times each; the others keep their width."""
+    used = np.empty(len(out), dtype=np.int64)
+    rows = np.empty((5, len(out)))
+    n = 0
+    for sub in range(len(out)):
+        if number[sub] > 0.0:
+            low = side.subs[sub, LOW]
+            used[n] = sub
+            rows[0, n], rows[1, n], rows[2, n] = out[sub], tall[sub], number[sub]
+            rows[3, n], rows[4, n] = low, max(low, high[sub])
+            n += 1
+    new = sized(rows[0, :n], rows[1, :n], rows[2, :n], rows[3, :n], rows[4, :n], total)
+    for i in range(n):
+        out[used[i]] = new[i]
     return out
 
 
 @compiled
 def build(side: Side, genome: Floats, counts: Integers, wide: Floats) -> tuple[Floats, Floats]:
     """Return pieces (p, 8) and elements (m, 5) of a side as `side_values` takes them."""
+    total = len(side.fixed)
+    for p in range(len(counts)):
+        total += counts[p]
     pieces = side.pieces.copy()
-    elements = np.empty((len(side.fixed) + counts.sum(), 5))
+    elements = np.empty((total, 5))
     n = 0
     for p in range(len(pieces)):
         first, fixed = int(side.pieces[p, 6]), int(side.pieces[p, 7])
         pieces[p, 6], pieces[p, 7] = n, fixed + counts[p]
         for e in range(first, first + fixed):
-            elements[n] = side.fixed[e]
+            for c in range(5):
+                elements[n, c] = side.fixed[e, c]
             n += 1
         for e in range(counts[p]):
             row = genome[p, e]
@@ -138,8 +162,12 @@ def least_energy(side: Side) -> tuple[float, Floats]:
     The three terms are bounded one by one: the ratio by what stands already, symmetry over the
     subsets of open pieces, alignment over the fractions that the stacked pieces allow.
     """
-    wall = (side.pieces[:, 4] * side.pieces[:, 5]).sum()
-    glass = (side.fixed[:, 3] * side.fixed[:, 4]).sum()
+    wall = 0.0
+    glass = 0.0
+    for p in range(len(side.pieces)):
+        wall += side.pieces[p, 4] * side.pieces[p, 5]
+    for e in range(len(side.fixed)):
+        glass += side.fixed[e, 3] * side.fixed[e, 4]
     if side.door[0] >= 0:
         sub = int(side.door[3])
         glass += side.subs[sub, WIDTH] * side.subs[sub, HEIGHT]
@@ -167,6 +195,7 @@ def _least_symmetry(side: Side, wall: float) -> tuple[float, Floats]:
     plan = np.ones(len(side.pieces))
     target = side.targets[1]
     base = 0.0
+    count = 0
     free = np.zeros(len(side.pieces))
     for p in range(len(side.pieces)):
         area = side.pieces[p, 4] * side.pieces[p, 5]
@@ -174,9 +203,10 @@ def _least_symmetry(side: Side, wall: float) -> tuple[float, Floats]:
         own = side.fixed[first : first + int(side.pieces[p, 7])]
         if side.room[p, OPEN] > 0.0:
             free[p] = area
+            count += 1
         if side.room[p, OPEN] > 0.0 or symmetric(side.pieces[p, 4], own):
             base += area
-    largest = np.argsort(-free)[: min(np.count_nonzero(free), 12)]
+    largest = np.argsort(free)[::-1][: min(count, 12)]
     if np.isnan(target):
         return 0.0, plan
     least, best = np.inf, 0
@@ -241,17 +271,22 @@ def _uneven(side: Side, genome: Floats, counts: Integers, wide: Floats) -> float
 @compiled
 def _unusual(side: Side, genome: Floats, counts: Integers, wide: Floats) -> float:
     """Return how far sizes are from their average, and kinds from their share in the library."""
-    k = len(side.subs)
-    have, usual = np.zeros(k), np.zeros(k)
+    extra = np.zeros(len(side.subs))  # elements of a substyle more than usual
     stretch = 0.0
     n = 0
     for p in range(len(side.pieces)):
         column = ABOVE if side.room[p, UPPER] > 0.0 else GROUND
-        weights = side.subs[:, column] / max(side.subs[:, column].sum(), 1e-9)
+        weight = 1e-9
+        for sub in range(len(extra)):
+            weight += side.subs[sub, column]
         for e in range(counts[p]):
             sub = int(genome[p, e, SUB])
-            have[sub] += 1.0
+            extra[sub] += 1.0
             stretch += (wide[sub] / side.subs[sub, WIDTH] - 1.0) ** 2
-            usual += weights
-            n += 1
-    return float(4.0 * stretch + np.abs(have - usual).sum() / 2) / n if n else 0.0
+        for sub in range(len(extra)):
+            extra[sub] -= counts[p] * side.subs[sub, column] / weight
+        n += counts[p]
+    unlike = 0.0
+    for sub in range(len(extra)):
+        unlike += abs(extra[sub]) / 2
+    return (4.0 * stretch + unlike) / n if n else 0.0

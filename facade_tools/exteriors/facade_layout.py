@@ -53,17 +53,25 @@ class Side(NamedTuple):
 
 
 @compiled
-def pick(rng: np.random.Generator, weights: Floats) -> int:
-    """Return an index drawn by weight; −1 where all weights are 0."""
-    total = weights.sum()
-    if total <= 0.0:
-        return -1
+def pick(rng: np.random.Generator, side: Side, p: int, doors: bool) -> int:
+    """Return a substyle drawn by its weight in the storey of piece p; −1 where there is none.
+
+    doors: whether doors may be drawn too.
+    """
+    column = ABOVE if side.room[p, UPPER] > 0.0 else GROUND
+    total = 0.0
+    for k in range(len(side.subs)):
+        if doors or side.subs[k, DOOR] == 0.0:
+            total += side.subs[k, column]
     mark = rng.random() * total
-    for i in range(len(weights)):
-        mark -= weights[i]
-        if mark < 0.0:
-            return i
-    return len(weights) - 1
+    last = -1
+    for k in range(len(side.subs)):
+        if side.subs[k, column] > 0.0 and (doors or side.subs[k, DOOR] == 0.0):
+            last = k
+            mark -= side.subs[k, column]
+            if mark < 0.0:
+                break
+    return last
 
 
 @compiled
@@ -162,8 +170,9 @@ def spread(rng: np.random.Generator, length: float, width: float, count: int, ev
         least[k] = width + GAP
     usual[0], usual[count] = usual[0] / 2, usual[count] / 2
     least[0] = least[count] = width / 2 + EDGE
+    most = np.full(count + 1, max(length, width + 1.0))
     ones = np.ones(count + 1)
-    gaps = sized(usual, ones, ones, least, np.maximum(least, length * ones), length)
+    gaps = sized(usual, ones, ones, least, most, length)
     at = 0.0
     for k in range(count):
         at += gaps[k]
@@ -202,16 +211,19 @@ def follow(side: Side, p: int, q: int, genome: Floats, counts: Integers) -> Floa
         if EDGE + 0.2 <= u <= side.pieces[p, 4] - EDGE - 0.2:
             out[n] = u
             n += 1
-    return np.sort(out[:n])
+    return out[:n]
 
 
 @compiled
 def _thinned(rng: np.random.Generator, centres: Floats) -> Floats:
     """Return the centres without one of them, drawn at random."""
-    if len(centres) == 0:
+    n = len(centres)
+    if n == 0:
         return centres
-    gone = int(rng.random() * len(centres))
-    return np.concatenate((centres[:gone], centres[gone + 1 :]))
+    gone = int(rng.random() * n)
+    for k in range(gone, n - 1):
+        centres[k] = centres[k + 1]
+    return centres[: n - 1]
 
 
 @compiled
@@ -219,20 +231,18 @@ def _mirrored(centres: Floats, length: float, apart: float) -> Floats:
     """Return centres that mirror themselves: each is kept with its mirror image or left out."""
     out = np.empty(2 * len(centres))
     n = 0
-    for u in centres:
+    for i in range(len(centres)):
+        u = centres[i]
         image = length - u
-        if abs(u - image) > 0.05 and abs(u - image) < apart:
-            continue
-        free = True
+        single = abs(u - image) <= 0.05
+        free = single or abs(u - image) >= apart
         for k in range(n):
             free = free and abs(out[k] - u) >= apart and abs(out[k] - image) >= apart
         if free:
             out[n] = u
-            n += 1
-            if abs(u - image) > 0.05:
-                out[n] = image
-                n += 1
-    return np.sort(out[:n])
+            out[n + 1] = image
+            n += 1 if single else 2
+    return out[:n]
 
 
 @compiled
@@ -285,8 +295,7 @@ def draw_piece(
 @compiled
 def _window(rng: np.random.Generator, side: Side, p: int) -> int:
     """Draw a piece's substyle of windows: a narrow one where the drawn one is too wide; or −1."""
-    weights = side.subs[:, ABOVE] if side.room[p, UPPER] > 0.0 else side.subs[:, GROUND]
-    sub = pick(rng, weights * (1.0 - side.subs[:, DOOR]))
+    sub = pick(rng, side, p, False)
     if sub >= 0 and SQUEEZE * side.subs[sub, WIDTH] + 2.0 * (EDGE + AIR) > side.pieces[p, 4]:
         return int(side.subs[sub, TWIN])
     return sub
@@ -306,11 +315,10 @@ def _fill(
     what: piece, substyle, whether the piece is to be symmetric.
     """
     p, sub, even = what
-    weights = side.subs[:, ABOVE] if side.room[p, UPPER] > 0.0 else side.subs[:, GROUND]
     m = len(centres)
     other, at = sub, -1
     if m and rng.random() < 0.3:
-        other, at = pick(rng, weights), int(rng.random() * m)
+        other, at = pick(rng, side, p, True), int(rng.random() * m)
         if side.subs[other, DOOR] > 0.0 and even:
             at = m // 2 if m % 2 == 1 else -1
     for k in range(m):

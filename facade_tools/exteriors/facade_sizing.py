@@ -30,17 +30,18 @@ def sized(
     """
     n = len(wanted)
     out = np.empty(n)
-    slope = share / weight
+    slope = np.empty(n)
     breaks = np.empty(2 * n)
     for i in range(n):
+        slope[i] = share[i] / weight[i]
         breaks[2 * i] = (low[i] - wanted[i]) / slope[i]
         breaks[2 * i + 1] = (high[i] - wanted[i]) / slope[i]
     order = np.argsort(breaks)
     reached = 0.0  # Σ b x(µ) at the breakpoint before
     for i in range(n):
         reached += share[i] * low[i]
+        out[i] = low[i]
     if n == 0 or total <= reached:
-        out[:] = low
         return out
     rising = 0.0  # Σ b² / m of the sizes between their bounds
     level = breaks[order[0]]
@@ -53,20 +54,10 @@ def sized(
         change = share[k // 2] * slope[k // 2]
         rising += change if k % 2 == 0 else -change
     else:
-        out[:] = high
+        for i in range(n):
+            out[i] = high[i]
         return out
     multiplier = level + (total - reached) / rising if rising > 0.0 else level
     for i in range(n):
         out[i] = _clipped(wanted[i] + multiplier * slope[i], low[i], high[i])
-    return out
-
-
-@compiled
-def sized_rows(
-    wanted: Floats, share: Floats, weight: Floats, low: Floats, high: Floats, totals: Floats
-) -> Floats:
-    """Return `sized` of every row of a population: all arguments (p, n), totals (p,)."""
-    out = np.empty_like(wanted)
-    for row in range(len(wanted)):
-        out[row] = sized(wanted[row], share[row], weight[row], low[row], high[row], totals[row])
     return out

@@ -59,11 +59,26 @@ def _breed(
     for p in range(len(side.pieces)):
         source = pair[0] if rng.random() < 0.5 else pair[1]
         number[p] = counts[source, p]
-        genome[p, : number[p]] = genomes[source, p, : number[p]]
+        for e in range(number[p]):
+            for c in range(5):
+                genome[p, e, c] = genomes[source, p, e, c]
     if rng.random() < 0.8:
-        free = np.flatnonzero(side.room[:, OPEN] > 0.0)
-        if len(free):
-            draw_piece(rng, side, free[int(rng.random() * len(free))], genome, number)
+        chosen = _open_piece(rng, side)
+        if chosen >= 0:
+            draw_piece(rng, side, chosen, genome, number)
+
+
+@compiled
+def _open_piece(rng: np.random.Generator, side: Side) -> int:
+    """Return a random piece that takes elements, or −1."""
+    chosen = -1
+    seen = 0
+    for p in range(len(side.pieces)):
+        if side.room[p, OPEN] > 0.0:
+            seen += 1
+            if rng.random() * seen < 1.0:
+                chosen = p
+    return chosen
 
 
 @compiled

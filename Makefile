@@ -6,7 +6,7 @@ FACADE := $(BIN)/facade
 OUT    ?= build/demo
 DATA   ?=
 
-.PHONY: demo demo-real test check lint types golden docs lock bench samples clean
+.PHONY: demo demo-real test check lint types golden docs lock bench samples judges clean
 
 # --- environment: pinned by requirements.lock, with hashes ---------------------------------------
 $(VENV)/.ready: requirements.lock pyproject.toml
@@ -47,6 +47,11 @@ bench: $(VENV)/.ready
 
 samples: $(VENV)/.ready
 	$(BIN)/python sample_data/make_samples.py
+
+# The Khronos glTF validator, which the tests ask where it is installed (needs node).
+judges: build/node_modules/gltf-validator
+build/node_modules/gltf-validator:
+	npm install --silent --no-save --prefix build gltf-validator@2.0.0-dev.3.10
 
 # --- upkeep ---------------------------------------------------------------------------------------
 lock:

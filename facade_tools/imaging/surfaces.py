@@ -11,6 +11,7 @@ from ..geometry.mesh import Material, Scene
 
 PATTERNS = ("", "siding", "shingle", "brick", "stone")
 GLOSSY = 0.35  # materials smoother than this mirror the sky
+LARGEST_TEXTURE = 1024  # pixels along an edge; larger ones are scaled down before they are drawn
 
 
 class Soup(NamedTuple):
@@ -104,4 +105,8 @@ def _decoded(data: bytes) -> Floats:
     picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
     if picture is None:
         return np.ones((1, 1, 3))
+    longest = max(picture.shape[:2])
+    if longest > LARGEST_TEXTURE:
+        height, width = (max(1, n * LARGEST_TEXTURE // longest) for n in picture.shape[:2])
+        picture = cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA)
     return to_linear(np.asarray(picture[:, :, ::-1] / 255.0, dtype=np.float64))

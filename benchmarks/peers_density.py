@@ -41,12 +41,15 @@ def columns(readings: Readings, layout: Layout) -> Columns:
 
 @dataclass(frozen=True)
 class Products:
+    """A mixture of products."""
+
     weights: np.ndarray
     mean: np.ndarray
     sd: np.ndarray
     tables: list[np.ndarray]
 
     def joint(self, c: Columns) -> np.ndarray:
+        """Return log P(class, row)."""
         total = np.tile(np.log(self.weights), (len(c.x), 1))
         seen = ~np.isnan(c.x)
         x = np.where(seen, c.x, 0.0)
@@ -59,6 +62,7 @@ class Products:
         return total
 
     def nll(self, c: Columns) -> np.ndarray:
+        """Return −log P(row)."""
         joint = self.joint(c)
         top = joint.max(axis=1)
         return -(np.log(np.exp(joint - top[:, None]).sum(axis=1)) + top)
@@ -72,7 +76,7 @@ def m_step(c: Columns, r: np.ndarray) -> Products:
     pooled = np.nan_to_num(pooled)
     mean = (r.T @ x + pooled * 0.1) / (rows + 0.1)
     spread = np.nan_to_num(np.nanvar(np.where(seen, c.x, np.nan), axis=0))
-    var = np.stack([(r[:, k, None] * seen * (x - mean[k]) ** 2).sum(axis=0) for k in range(r.shape[1])])
+    var = np.stack([(r[:, [k]] * seen * (x - m) ** 2).sum(axis=0) for k, m in enumerate(mean)])
     sd = np.maximum(np.sqrt((var + 0.1 * spread) / (rows + 0.1)), c.floor)
     tables = [
         np.stack([r[s == v].sum(axis=0) + 0.5 for v in range(m)], axis=1)
@@ -82,7 +86,9 @@ def m_step(c: Columns, r: np.ndarray) -> Products:
     return Products(r.mean(axis=0) + 1e-12, mean, sd, tables)
 
 
-def fit_products(c: Columns, rng: np.random.Generator, largest: int = 16, starts: int = 3) -> Products:
+def fit_products(
+    c: Columns, rng: np.random.Generator, largest: int = 16, starts: int = 3
+) -> Products:
     """EM from several random starts a size; the size by BIC."""
     best, best_bic, worse = None, np.inf, 0
     d, cats = c.x.shape[1], sum(m - 1 for m in c.sizes)
@@ -103,7 +109,7 @@ def fit_products(c: Columns, rng: np.random.Generator, largest: int = 16, starts
 
 def _em(c: Columns, k: int, rng: np.random.Generator) -> tuple[Products, float]:
     seeds = rng.choice(len(c.x), k, replace=False)
-    scale = np.maximum(np.nan_to_num(np.nanstd(np.where(np.isnan(c.x), np.nan, c.x), axis=0)), c.floor)
+    scale = np.maximum(np.nan_to_num(np.nanstd(c.x, axis=0)), c.floor)
     x = np.nan_to_num((c.x - np.nan_to_num(np.nanmean(c.x, axis=0))) / scale)
     look = np.concatenate([x, np.stack(c.states, axis=1)], axis=1)
     near = ((look[:, None] - look[seeds]) ** 2).sum(axis=2).argmin(axis=1)

@@ -71,10 +71,10 @@ def accept(rows: Readings, network: Network, given: Attributes, fixed: tuple[Bit
         for column, least in zip(sizes, given.bounds.bbox_min, strict=True):
             good &= column >= least * (1 - 1e-12)
     for name in ("r1", "x"):
-        column = columns.get(name)
-        if column:
+        found = columns.get(name)
+        if found:
             low, high = (0.0, 1.0) if name == "r1" else (1.0, np.inf)
-            good &= (column[0] >= low - 1e-9) & (column[0] <= high + 1e-9)
+            good &= (found[0] >= low - 1e-9) & (found[0] <= high + 1e-9)
     return good & _garage_fits(columns)
 
 

@@ -55,11 +55,11 @@ def draw_given(
     out: dict[int, tuple[Floats, Bits]] = {}
     for g in topological(network.families, network.layout):
         row = _Row(network, data, given, g)
-        values, states, factor = _draw_group(row, styles, shown, rng)
+        drawn, states, factor = _draw_group(row, styles, shown, rng)
         weight += factor
-        out[g] = (values, states[:, [c.coordinate < 0 for c in row.layout.channels]])
+        out[g] = (drawn, states[:, [c.coordinate < 0 for c in row.layout.channels]])
     groups = range(len(network.layout.groups))
-    values, parts = (tuple(out[g][i] for g in groups) for i in (0, 1))
+    values, parts = tuple(out[g][0] for g in groups), tuple(out[g][1] for g in groups)
     rows = Readings(given.ids * n, values, parts, bits)
     return Particles(Draws(rows, styles), weight)
 

@@ -115,8 +115,8 @@ def _group_features(data: GroupData, values: Floats, group: GroupLayout) -> tupl
     """Return what children see: values (0 at an atom) and one indicator an atom or part."""
     columns, known = [], []
     absent = np.isinf(values)
-    for i, channel in enumerate(group.channel_of):
-        at_atom = data.states[:, channel] > 0 if channel >= 0 else False
+    for i, own in enumerate(group.channel_of):
+        at_atom = data.states[:, own] > 0 if own >= 0 else False
         columns.append(data.x[:, i])
         known.append(data.dense[:, i] | absent[:, i] | at_atom)
     for c, channel in enumerate(group.channels):

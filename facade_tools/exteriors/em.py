@@ -75,7 +75,7 @@ def fit_gaussian(
     coef = np.linalg.solve(a, np.swapaxes(xu, 1, 2)).swapaxes(1, 2)
     scatter = xx - coef @ a @ np.swapaxes(coef, 1, 2)
     total = uu[:, 0, 0][:, None, None] + _power(width, prior)
-    return coef, clip(wishart_scale(d, prior) + scatter, total, floor)
+    return np.asarray(coef), clip(wishart_scale(d, prior) + scatter, total, floor)
 
 
 def _power(width: int, prior: Prior) -> float:
@@ -85,7 +85,7 @@ def _power(width: int, prior: Prior) -> float:
 
 def wishart_scale(d: int, prior: Prior) -> Floats:
     """Return the scale of the inverse Wishart prior, (d, d)."""
-    return np.eye(d) * prior.spread * (d + prior.freedom)
+    return np.asarray(np.eye(d) * (prior.spread * (d + prior.freedom)))
 
 
 def clip(scatter: Floats, total: Floats, floor: Floats) -> Floats:
@@ -95,7 +95,7 @@ def clip(scatter: Floats, total: Floats, floor: Floats) -> Floats:
     values, vectors = np.linalg.eigh(scaled)
     if values.size and values.min() < 1.0:
         scaled = (vectors * np.maximum(values, 1.0)[:, None, :]) @ np.swapaxes(vectors, 1, 2)
-    return scaled * floor[:, :, None] * floor[:, None, :]
+    return np.asarray(scaled * floor[:, :, None] * floor[:, None, :])
 
 
 def fit_table(counts: Floats, strength: float) -> Floats:

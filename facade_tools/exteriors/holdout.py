@@ -9,6 +9,7 @@ import numpy as np
 
 from ..artifacts.attributes import Attributes
 from ..randomness import item_generator
+from .coordinates import Floats
 from .evaluation import negative_log_density
 from .learning import LearnOptions, Variant, learn_model
 
@@ -41,22 +42,22 @@ def compare_variants(
     repeats: int,
     *,
     seed: int = 0,
-    options: LearnOptions = LearnOptions(),
+    options: LearnOptions | None = None,
     variants: Sequence[Variant] = VARIANTS,
 ) -> tuple[Comparison, ...]:
     """Return the held-out comparison of variants, each on the same splits."""
-    found: dict[str, list[np.ndarray[tuple[int], np.dtype[np.float64]]]] = {v: [] for v in variants}
+    found: dict[str, list[Floats]] = {v: [] for v in variants}
     for train, test in splits(len(rows), repeats, seed):
         for variant in variants:
             rng = item_generator(seed, "holdout", variant)
-            chosen = replace(options, variant=variant)
+            chosen = replace(options or LearnOptions(), variant=variant)
             model = learn_model([rows[i] for i in train], rng=rng, options=chosen)
             found[variant].append(negative_log_density(model, [rows[i] for i in test]))
     first = np.concatenate(found[variants[0]])
     return tuple(_compared(v, np.concatenate(found[v]), first) for v in variants)
 
 
-def _compared(variant: str, nll: np.ndarray, first: np.ndarray) -> Comparison:  # type: ignore[type-arg]
+def _compared(variant: str, nll: Floats, first: Floats) -> Comparison:
     root = float(np.sqrt(len(nll)))
     gap = nll - first
     return Comparison(

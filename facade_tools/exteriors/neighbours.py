@@ -45,7 +45,7 @@ class Neighbours:
                 continue
             rows, place = tree
             distance, index = rows.query(points)
-            yield group.name, place[index], distance
+            yield group.name, place[index], np.asarray(distance)
 
     def whole(self, readings: Readings) -> Floats:
         """Return embeddings (n, m) over all groups, for distances between samples."""

@@ -106,7 +106,7 @@ def marginal(family: Family, local: Floats) -> Floats:
     if family.direct:
         return local
     top = local.max(axis=1, keepdims=True)
-    return log_(np.exp(local - top) @ family.hidden.T) + top
+    return np.asarray(log_(np.exp(local - top) @ family.hidden.T) + top)
 
 
 def infer(network: Network, data: Dataset, weights: Weights | None = None) -> Posterior:

@@ -6,7 +6,10 @@ settled here: the nearest possible value takes the place of an impossible one (d
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from .coordinates import Bits, Floats
 from .groups import ABSENT, ATOM_TOLERANCE
@@ -19,7 +22,7 @@ GAP = 1e-3  # how far a porch keeps from the middle line, relative
 class Columns:
     """Looks up coordinates of rows by name; what a layout lacks is None."""
 
-    def __init__(self, values: tuple[Floats, ...], layout: Layout) -> None:
+    def __init__(self, values: tuple[NDArray[Any], ...], layout: Layout) -> None:
         """Keep views of the arrays: writing to a column writes to the row."""
         self._columns = {
             c.name: values[g][:, i]
@@ -27,7 +30,7 @@ class Columns:
             for i, c in enumerate(group.coordinates)
         }
 
-    def get(self, *names: str) -> list[Floats] | None:
+    def get(self, *names: str) -> list[NDArray[Any]] | None:
         """Return the columns, or None where the layout lacks one."""
         if any(name not in self._columns for name in names):
             return None
@@ -93,7 +96,7 @@ def _garage(columns: Columns, held: Columns | None) -> None:
         _put(garage, np.minimum(garage, house), held, f"garage.{size}")
         needed = np.where(here, garage, 0.0)
         if place:
-            (at,) = columns.get(f"garage.{place}")  # type: ignore[misc]
+            (at,) = columns.get(f"garage.{place}") or [house]
             half = np.where(here, garage / house / 2, 0.0)
             inside = np.clip(at, np.minimum(half, 0.5), np.maximum(1 - half, 0.5))
             _put(at, inside, held, f"garage.{place}")

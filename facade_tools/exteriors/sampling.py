@@ -52,7 +52,7 @@ def pick(probabilities: Floats, rng: np.random.Generator) -> Ints:
     u = rng.random((len(probabilities), 1))
     cumulative = np.cumsum(probabilities, axis=1)
     index = (u * cumulative[:, -1:] > cumulative).sum(axis=1)
-    return np.minimum(index, probabilities.shape[1] - 1)
+    return np.asarray(np.minimum(index, probabilities.shape[1] - 1))
 
 
 def draw_bits(
@@ -85,9 +85,9 @@ def draw_groups(
     for g in topological(network.families, layout):
         family, group = network.families[g], layout.groups[g]
         clusters = styles if family.direct else pick(family.hidden[styles], rng)
-        states = np.stack(
-            [pick(table[clusters], rng) for table in family.tables] or [np.zeros(count)], axis=1
-        ).astype(np.int8)[:, : len(family.tables)]
+        states = np.zeros((count, len(family.tables)), dtype=np.int8)
+        for c, table in enumerate(family.tables):
+            states[:, c] = pick(table[clusters], rng)
         x = draw_normal(family, clusters, shown, rng)
         values = values_of(own_units(x, group, network.scalings[g]), states, group)
         if group.name == "arf" and "r1" in layout.features:
@@ -98,7 +98,7 @@ def draw_groups(
 
 
 def _flat(layout: Layout, shown: Floats) -> Masks:
-    return shown[:, layout.features.index("r1=0")] == 1
+    return np.asarray(shown[:, layout.features.index("r1=0")] == 1)
 
 
 def _parts(states: Bits, group: GroupLayout) -> Bits:
@@ -121,10 +121,10 @@ def show(shown: Floats, x: Floats, values: Floats, states: Bits, layout: Layout,
     """Write what children see of group g into `shown` (as `dataset` does for data)."""
     group = layout.groups[g]
     at = layout.feature_group.index(g) if group.features else 0
-    for i, channel in enumerate(group.channel_of):
+    for i, own in enumerate(group.channel_of):
         dense = np.isfinite(values[:, i])
-        if channel >= 0:
-            dense &= states[:, channel] == 0
+        if own >= 0:
+            dense &= states[:, own] == 0
         shown[:, at] = np.where(dense, x[:, i], 0.0)
         at += 1
     for c, channel in enumerate(group.channels):

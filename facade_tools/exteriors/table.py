@@ -27,7 +27,10 @@ KEYS = {"columns", "transform", "floor", "atoms"}
 
 @dataclass(frozen=True, slots=True)
 class Declaration:
-    """groups.yaml: `groups: {name: [columns] or {columns, transform, floor, atoms}}, bits: {name: [columns]}`."""
+    """groups.yaml.
+
+    `groups: {name: [columns] or {columns, transform, floor, atoms}}, bits: {name: [columns]}`.
+    """
 
     groups: Mapping[str, Mapping[str, Any]]
     bits: Mapping[str, Sequence[str]]

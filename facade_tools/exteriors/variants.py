@@ -201,4 +201,4 @@ def _length(rows: Rows, fit: Local) -> float:
     """Return the description length: −log likelihood + parameters/2 · log n."""
     clusters, d = fit.family.coef.shape[:2]
     free = clusters * (d + d * (d + 1) / 2) + clusters - 1
-    return -fit.total + free / 2 * float(np.log(len(rows.data)))
+    return float(-fit.total + free / 2 * np.log(len(rows.data)))

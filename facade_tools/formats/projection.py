@@ -80,7 +80,7 @@ def _geographic(conformal: Floats) -> Floats:
     for _ in range(4):
         found = _conformal(tangent)
         slope = (1.0 + (1.0 - ECCENTRICITY**2) * tangent**2) / (
-            (1.0 - ECCENTRICITY**2) * np.hypot(1.0, found) * np.hypot(1.0, tangent)
+            (1.0 - ECCENTRICITY**2) * np.hypot(1.0, tangent)
         )
         tangent = tangent + (conformal - found) / np.hypot(1.0, found) * slope
     return tangent

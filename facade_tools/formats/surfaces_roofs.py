@@ -20,6 +20,7 @@ LEVEL = 7.0  # degrees: flatter is flat
 STEEPEST = 80.0  # degrees: steeper is a wall
 SHARE = 0.07  # of the sloped area: a direction with less is a detail
 MANSARD_TURN = 18.0  # degrees between two slopes to one side
+INSET = 1e-3  # metres: heights are read this far inside the outline
 EDGE = 0.02  # metres: corners nearer than this are one
 CODES: dict[str, RoofStyle] = {
     "1000": "flat",
@@ -117,7 +118,7 @@ def eaves_height(planes: Sequence[Plane], plan: BaseGeometry) -> float:
 
 
 def _outline_points(plan: BaseGeometry) -> Floats:
-    inside = areas(plan.buffer(-0.05))
+    inside = areas(plan.buffer(-INSET))
     border = (plan if inside.is_empty else inside).boundary
     count = max(12, min(200, int(border.length / 0.3)))
     places = (np.arange(count) + 0.5) / count

@@ -10,14 +10,14 @@ import numpy as np
 
 from facade_tools.errors import FacadeError
 
-from .arrays import Floats
+from .arrays import Floats, Points2
 from .polygons import Rings
 from .skeleton_check import fault
 from .skeleton_faces import faces_of
 from .skeleton_shape import Contour, Skeleton
 from .wavefront import DONE, Edges, Front, propagate, traced, wavefront
 
-__all__ = ["Contour", "Skeleton", "SkeletonFailed", "straight_skeleton"]
+__all__ = ["Contour", "Skeleton", "SkeletonFailed", "skeleton_by", "straight_skeleton"]
 
 LOG = logging.getLogger("facade_tools.geometry")
 
@@ -40,10 +40,10 @@ _PATHS = (
     _Path(1e-11),
     _Path(1e-8),
     _Path(1e-9, turn=17.3),
-    _Path(1e-10, turn=51.7, displacement=1e-10),
-    _Path(1e-12, displacement=1e-9),
-    _Path(1e-12, turn=33.1, displacement=1e-9),
-    _Path(1e-12, turn=71.9, displacement=1e-8),
+    _Path(1e-11, turn=51.7, displacement=1e-9),
+    _Path(1e-11, displacement=3e-9),
+    _Path(1e-12, turn=33.1, displacement=3e-9),
+    _Path(1e-11, turn=71.9, displacement=1e-8),
 )
 
 
@@ -60,16 +60,17 @@ def straight_skeleton(rings: Rings, speeds: Sequence[float] | Floats | None = No
     edges displaced by at most 1e-8 of its size. Raises SkeletonFailed when none passes.
     """
     contour = Contour.of(rings, speeds)
-    for path in _PATHS:
-        skeleton, problem = _computed(contour, path)
+    for path in range(len(_PATHS)):
+        skeleton, problem = skeleton_by(contour, path)
         if skeleton is not None and not problem:
             return skeleton
-        LOG.debug("skeleton of %d edges failed: %s, %s", len(contour.points), problem, path)
+        LOG.debug("skeleton of %d edges failed on path %d: %s", len(contour.points), path, problem)
     raise SkeletonFailed(f"no skeleton of a polygon of {len(contour.points)} edges")
 
 
-def _computed(contour: Contour, path: _Path) -> tuple[Skeleton | None, str]:
-    """Return the skeleton by one path and what is wrong with it."""
+def skeleton_by(contour: Contour, number: int) -> tuple[Skeleton | None, str]:
+    """Return the skeleton by one of the paths and what is wrong with it ("" for nothing)."""
+    path = _PATHS[number]
     low, high = contour.points.min(axis=0), contour.points.max(axis=0)
     centre, size = (low + high) / 2, float(np.hypot(*(high - low))) / 2
     local = replace(contour, points=(contour.points - centre) @ _rotation(path.turn) / size)
@@ -89,13 +90,35 @@ def _computed(contour: Contour, path: _Path) -> tuple[Skeleton | None, str]:
 
 def _propagated(local: Contour, path: _Path) -> tuple[Front, int]:
     along, normal, offset = local.frames()
-    edges = Edges(along, normal, offset, local.speeds)
-    front = wavefront(local.points, local.following)
+    points = local.points
     if path.displacement:
-        rng = np.random.default_rng(len(offset))
-        offset += path.displacement * rng.uniform(-1, 1, len(offset))
+        offset, points = _displaced(local, path.displacement)
+    edges = Edges(along, normal, offset, local.speeds)
+    front = wavefront(points, local.following)
     limit = 2.0 / float(local.speeds[local.speeds > 0].min())
     return front, propagate(edges, front, path.near, limit)
+
+
+def _displaced(local: Contour, reach: float) -> tuple[Floats, Points2]:
+    """Return offsets (n,) displaced at random by at most `reach`, and the points that fit them.
+
+    Edges in one line move together, all others apart, so that no two events are simultaneous.
+    """
+    along, normal, offset = local.frames()
+    moves = np.random.default_rng(len(offset)).uniform(-reach, reach, len(offset))
+    points = np.empty_like(local.points)
+    for e, f in enumerate(local.following):
+        cross = along[e, 0] * along[f, 1] - along[e, 1] * along[f, 0]
+        if abs(cross) <= 1e-6:
+            moves[f] = moves[e]
+    for e, f in enumerate(local.following):
+        cross = along[e, 0] * along[f, 1] - along[e, 1] * along[f, 0]
+        if abs(cross) <= 1e-6:
+            step = moves[e] * normal[f]
+        else:
+            step = (along[f] * moves[e] - along[e] * moves[f]) / cross
+        points[f] = local.points[f] + step
+    return offset + moves, points
 
 
 def _rotation(degrees: float) -> Floats:

@@ -51,7 +51,7 @@ def _joined(vertices: Points3, pieces: list[Piece]) -> list[Face]:
                     edges[ring[k - 1], end] = None
     if not edges:
         return []
-    if len(pieces) == 1:
+    if len(pieces) == 1 and len(edges) == len({start for start, _ in edges}):
         return [tuple(tuple(ring) for ring in pieces[0].rings)]
     normal = np.sum([newell_normal(vertices[piece.rings[0]]) for piece in pieces], axis=0)
     return _nested(vertices, _loops(vertices, list(edges), normal), normal)

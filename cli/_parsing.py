@@ -49,7 +49,8 @@ class ParseOptions:
     def recorded(self) -> dict[str, str | None]:
         """Options that can change the content."""
         return {
-            "method": self.method, "solver": self.solver, "mask": self.mask and Path(self.mask).name,
+            "method": self.method, "solver": self.solver,
+            "mask": self.mask and Path(self.mask).name,
             "grammar": self.grammar and Path(self.grammar).name,
             "classifier": self.classifier and Path(self.classifier).name,
         }  # fmt: skip

@@ -26,7 +26,7 @@ def nodes(node: Node) -> Iterator[Node]:
 
 
 def painted(tree: Node, shape: tuple[int, int], index: Mapping[str, int]) -> NDArray[np.uint8]:
-    """Return the label map (height, width) of a plane derivation whose scopes are pixels, y down."""
+    """Return the label map (height, width) of a plane derivation; scopes are pixels, y down."""
     out = np.zeros(shape, np.uint8)
     for leaf in leaves(tree):
         x0, y0, x1, y1 = (round(v) for v in leaf.scope)

@@ -1,4 +1,4 @@
-"""What every method of reading a photograph takes and gives; the methods never import one another."""
+"""What every method of reading a photograph takes and gives."""
 
 from __future__ import annotations
 

@@ -19,8 +19,10 @@ GAIN = np.float32(255.0)
 
 
 def context_features(probabilities: Probabilities) -> Features:
-    """Return the planes of context of class probabilities (auto-context): the pixel's own, blurred,
-    of its row and column, of neighbours, and how much of each class lies above and below.
+    """Return the planes of context of class probabilities (auto-context).
+
+    For each class: the pixel's own, blurred, of its row and column, of neighbours, and how much
+    of the class lies above and below.
 
     >>> context_features(np.full((2, 4, 6), 0.5, np.float32)).shape[1:]
     (4, 6)

@@ -23,10 +23,8 @@ class Header:
 
 def header(data: bytes, name: str) -> Header:
     """Return the header of a JPEG, PNG, TIFF, BMP, WebP or GIF. Raises InvalidInput with `name`."""
-    for magic, read in _READERS:
-        if data.startswith(magic):
-            break
-    else:
+    read = next((one for magic, one in _READERS if data.startswith(magic)), None)
+    if read is None:
         raise InvalidInput(
             "is no picture that can be read; expected JPEG, PNG, TIFF, BMP or WebP"
         ).at(name)

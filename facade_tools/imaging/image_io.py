@@ -109,17 +109,27 @@ def _eight_bit_rgb(picture: NDArray[np.generic]) -> Picture:
     return np.ascontiguousarray(picture[:, :, 2::-1]).astype(np.uint8)
 
 
-def read_labels(path: str) -> NDArray[np.uint8]:
-    """Return an 8-bit label map. Raises InvalidInput on a colour picture."""
+def read_label_picture(path: str) -> NDArray[np.uint8]:
+    """Return a label map as stored: (height, width) indices, or (height, width, 3) RGB colours."""
     data = _bytes(path)
     info = header(data, path)
     if info.width * info.height > MAX_PIXELS:
         raise InvalidInput(f"has {info.width}×{info.height} pixels; too large").at(path)
     with _quiet():
         picture = _decode(data, cv2.IMREAD_UNCHANGED)
-    if picture is None or picture.ndim != 2 or picture.dtype != np.uint8:
-        raise InvalidInput("expected a label map: one channel of 8 bits (PNG)").at(path)
+    if picture is None or picture.dtype != np.uint8:
+        raise InvalidInput("expected a label map of 8 bits (PNG)").at(path)
+    if picture.ndim == 3:
+        picture = picture[:, :, 2::-1]
     return picture.astype(np.uint8)
+
+
+def read_labels(path: str) -> NDArray[np.uint8]:
+    """Return an 8-bit map of one channel. Raises InvalidInput on a colour picture."""
+    picture = read_label_picture(path)
+    if picture.ndim != 2:
+        raise InvalidInput("expected a map of one channel (grey PNG)").at(path)
+    return picture
 
 
 def fitted(picture: Picture, height: int, pixels: int) -> Picture:

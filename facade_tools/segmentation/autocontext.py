@@ -15,19 +15,18 @@ from .trees import Codes, Trees, softmax
 
 Labels = NDArray[np.uint8]  # (height, width), 0 is ignored, k is class k - 1
 
-EARLY_STRIDE = 2  # early stages only give context, which is smooth
+EARLY_STRIDE = 3  # early stages only give context, which is smooth
 
 Fit = Callable[[Codes, NDArray[np.intp]], Trees]
 
 
 @dataclass(frozen=True, slots=True)
 class Example:
-    """A picture at working resolution with its label map; `fold` keeps a picture's variants together."""
+    """A picture at working resolution and its label map; variants of a picture share its `fold`."""
 
     picture: Picture
     labels: Labels
     fold: int
-    whole: bool = True  # False: a variant that trains but is not predicted for others
 
 
 def features_of(picture: Picture, before: Probabilities | None) -> Features:

@@ -18,15 +18,17 @@ class BoostOptions:
     """How trees are grown.
 
     rounds: trees a class. leaves, depth: of one tree. rate: shrinkage. least: pixels a leaf.
-    share: of the features that a tree may look at.
+    share, most_features: of all features, how
+    many a tree may look at.
     """
 
-    rounds: int = 80
+    rounds: int = 60
     leaves: int = 32
     depth: int = 8
-    rate: float = 0.12
+    rate: float = 0.15
     least: int = 40
     share: float = 0.25
+    most_features: int = 40
 
 
 def train_boosted(
@@ -44,10 +46,11 @@ def train_boosted(
     """
     import lightgbm
 
+    share = min(options.share, options.most_features / codes.shape[1])
     settings = {
         "objective": "multiclass", "num_class": classes, "num_leaves": options.leaves,
         "max_depth": options.depth, "learning_rate": options.rate,
-        "min_data_in_leaf": options.least, "feature_fraction": options.share,
+        "min_data_in_leaf": options.least, "feature_fraction": share,
         "lambda_l2": 2.0, "max_bin": 63, "num_threads": 1, "verbosity": -1, "seed": seed,
         "deterministic": True, "force_row_wise": True,
     }  # fmt: skip

@@ -46,7 +46,7 @@ class Solution:
 
 
 def solve(field: Field, plan: Plan) -> Solution:
-    """Return the best of several alternations. Raises Infeasible where no facade of the grammar fits.
+    """Return the best of several alternations. Raises Infeasible where no facade fits.
 
     A grammar whose floors derive each for itself starts from the best with common columns.
     """
@@ -72,6 +72,11 @@ def solve(field: Field, plan: Plan) -> Solution:
         trace += path
         reached = path[-1]
     return Solution(best, energy(field, plan, best), tuple(trace), bound)
+
+
+def relaxed_bound(field: Field, plan: Plan) -> float:
+    """Return what no layout of the grammar can cost less than, common columns or not."""
+    return _solve_rows(field, plan, _relaxed(field, plan)[0]).cost
 
 
 def _relaxed(field: Field, plan: Plan) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -145,7 +150,7 @@ def _priors(field: Field, plan: Plan, layout: Layout) -> float:
 
 
 def owners(plan: Plan, rows: Cut) -> tuple[int, ...]:
-    """Return the set of columns of each row: one a group, or one an instance where `each` says so."""
+    """Return the set of columns of each row: one a group, or an instance where `each` says so."""
     out: list[int] = []
     known: dict[int, int] = {}
     count = 0

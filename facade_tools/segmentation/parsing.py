@@ -21,7 +21,7 @@ from ..grammar.plan import plan as make_plan
 from ..grammar.reading import Method, Reading, ReadOptions, label_index
 from ..imaging.features_context import Probabilities
 from ..imaging.image_io import Photo
-from . import dp
+from . import dp, walk
 from .classifier import Classifier, default
 from .classifier import load as load_classifier
 from .deriving import Frame, derivation, floors_of, regions_of, with_confidence
@@ -44,6 +44,7 @@ Solver = Callable[[Field, Plan, np.random.Generator], dp.Solution]
 
 SOLVERS: Mapping[str, Solver] = {
     "dp": lambda field, plan, _: dp.solve(field, plan),
+    "walk": lambda field, plan, rng: walk.solve(field, plan, rng=rng),
 }
 
 
@@ -113,7 +114,7 @@ def read_facade(
 def raw_labels(
     belief: Probabilities, classes: tuple[str, ...], shape: tuple[int, int]
 ) -> NDArray[np.uint8]:
-    """Return the label map of the likeliest classes in a picture of `shape`, beliefs interpolated."""
+    """Return the label map of the likeliest classes, beliefs interpolated to `shape`."""
     index = np.array([_index(name) for name in classes], np.uint8)
     size = (shape[1], shape[0])
     best = np.full(shape, -1.0, np.float32)

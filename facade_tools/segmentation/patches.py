@@ -34,7 +34,7 @@ def patch_tests(side: int) -> PatchTests:
 
 
 def patch_codes(picture: Picture, tests: PatchTests, at: NDArray[np.intp] | None = None) -> Codes:
-    """Return (pixels, tests): values of single pixels, then 255 where the first of a pair is brighter.
+    """Return (pixels, tests): single values, then 255 where the first of a pair is brighter.
 
     at: flat indices of pixels; all without it. Borders are mirrored.
     """

@@ -1,0 +1,132 @@
+"""Facade parsing by folds: raw classifier, dp and walk, from a folder of images and label maps.
+
+    python benchmarks/facade_parsing.py DATA [--convention ecp] [--folds 5] [--work FOLDER]
+
+DATA holds images/ and labels/. Trained classifiers are kept in --work and used again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from facade_tools.artifacts.parse import LABELS
+from facade_tools.grammar.derivation import painted
+from facade_tools.grammar.library import builtin
+from facade_tools.grammar.plan import plan
+from facade_tools.grammar.reading import label_index
+from facade_tools.randomness import item_generator
+from facade_tools.segmentation import dp, walk
+from facade_tools.segmentation.classifier import load, save
+from facade_tools.segmentation.conventions import convention
+from facade_tools.segmentation.deriving import Frame, derivation, regions_of
+from facade_tools.segmentation.energy import field_of
+from facade_tools.segmentation.evaluation import (
+    Tally,
+    boxes_of_labels,
+    boxes_of_regions,
+)
+from facade_tools.segmentation.parsing import raw_labels
+from facade_tools.segmentation.training import TrainOptions, read_pairs, train
+
+GRAMMARS = ("haussmann", "haussmann-floors")
+
+
+def trained(path, pairs, options, fold):
+    if not path.exists():
+        start = time.process_time()
+        path.write_bytes(save(train(pairs, options, rng=item_generator(0, "train", fold))))
+        print(f"fold {fold}: trained in {time.process_time() - start:.0f} s of CPU", flush=True)
+    return load(str(path))
+
+
+def measure(pair, classifier, plans, walks, tallies, times):
+    shape = pair.labels.shape
+    start = time.process_time()
+    working = classifier.working(pair.picture)
+    belief = classifier.probabilities(working)
+    times["classifier"].append(time.process_time() - start)
+    truth = boxes_of_labels(pair.labels)
+    raw = raw_labels(belief, classifier.classes, shape)
+    tallies["raw"].add(pair.labels, raw, truth, boxes_of_labels(raw))
+    for name, made in plans.items():
+        field = field_of(belief, classifier.classes, made)
+        solvers = {"dp": lambda f, p: dp.solve(f, p)}
+        if walks:
+            rng = item_generator(0, "walk", pair.name)
+            solvers["walk"] = lambda f, p, rng=rng: walk.solve(f, p, rng=rng)
+        for solver, solve in solvers.items():
+            start = time.process_time()
+            solution = solve(field, made)
+            times[f"{solver} {name}"].append(time.process_time() - start)
+            times[f"{solver} {name} energy"].append(solution.energy)
+            tree = derivation(made, solution.layout, Frame(working.shape[:2], shape))
+            labels = painted(tree, shape, label_index())
+            key = f"{solver} {name}"
+            tallies[key].add(pair.labels, labels, truth, boxes_of_regions(regions_of(tree)))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("data", type=Path)
+    parser.add_argument("--convention", default="ecp")
+    parser.add_argument("--folds", type=int, default=5)
+    parser.add_argument("--only", type=int, nargs="*", help="these folds alone")
+    parser.add_argument("--features", default="context")
+    parser.add_argument("--classifier", help="test this one on everything instead of training")
+    parser.add_argument("--work", type=Path, default=Path("build/facade_parsing"))
+    parser.add_argument("--no-walk", action="store_true")
+    parser.add_argument("--limit", type=int, default=10**6, help="pictures")
+    args = parser.parse_args()
+    cv2.setNumThreads(1)
+    args.work.mkdir(parents=True, exist_ok=True)
+    images, labels = str(args.data / "images"), str(args.data / "labels")
+    pairs = list(read_pairs(images, labels, convention(args.convention)))[: args.limit]
+    folds = item_generator(0, "folds").permutation(len(pairs)) % args.folds
+    options = replace(TrainOptions(), features=args.features)
+    plans = {name: plan(builtin(name)) for name in GRAMMARS}
+    solvers = ("dp",) if args.no_walk else ("dp", "walk")
+    keys = ["raw", *(f"{s} {g}" for s in solvers for g in GRAMMARS)]
+    tallies = {key: Tally() for key in keys}
+    times = {key: [] for key in ["classifier", *keys[1:], *(f"{k} energy" for k in keys[1:])]}
+    for fold in range(args.folds) if args.only is None else args.only:
+        rest = [pair for pair, f in zip(pairs, folds, strict=True) if f != fold]
+        test = [pair for pair, f in zip(pairs, folds, strict=True) if f == fold]
+        if args.classifier:
+            classifier = load(args.classifier)
+        else:
+            path = args.work / f"{args.data.name}-{args.features}-{fold}.npz"
+            classifier = trained(path, rest, options, fold)
+        for pair in test:
+            measure(pair, classifier, plans, not args.no_walk, tallies, times)
+        print(f"after fold {fold}, {tallies['raw'].pictures} pictures:", flush=True)
+        report(tallies, times)
+
+
+def report(tallies, times):
+    print(f"{'':24} acc7   acc8   mIoU7  mIoU8  F1 win rows  cols   s/image  recall by class")
+    for key, tally in tallies.items():
+        recall = " ".join(f"{v:.2f}" for v in tally.recall(fold_chimney=True))
+        spent = np.mean(times["classifier" if key == "raw" else key])
+        print(
+            f"{key:24} {tally.accuracy(fold_chimney=True):.4f} {tally.accuracy():.4f} "
+            f"{tally.mean_iou(fold_chimney=True):.4f} {tally.mean_iou():.4f} {tally.f1():.4f} "
+            f"{tally.rows_right():.3f} {tally.columns_right():.3f}  {spent:.3f}    {recall}"
+        )
+    print("classes:", " ".join(LABELS[1:8]))
+    for grammar in GRAMMARS:
+        exact, walked = (np.array(times.get(f"{s} {grammar} energy", [])) for s in ("dp", "walk"))
+        if len(walked):
+            share = np.mean(exact <= walked + 1e-6)
+            print(f"{grammar}: dp's energy at most the walk's on {share:.1%} of {len(exact)}")
+    print("confusion (rows truth, columns raw):")
+    print(tallies["raw"].confusion, flush=True)
+
+
+if __name__ == "__main__":
+    main()

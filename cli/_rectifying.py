@@ -1,0 +1,56 @@
+"""The body of `facade rectify`."""
+
+from __future__ import annotations
+
+import logging
+import re
+import sys
+from pathlib import Path
+
+import click
+import numpy as np
+
+from facade_tools.artifacts.numbers import dump_document
+from facade_tools.artifacts.writing import write_bytes
+from facade_tools.errors import InvalidInput
+from facade_tools.imaging.homography import Points
+from facade_tools.imaging.image_io import encoded, read_photo
+from facade_tools.imaging.rectify import automatic, from_corners
+
+LOG = logging.getLogger("facade_tools.rectify")
+
+
+def run_rectify(image: str, output: str | None, corners: str, report: str | None) -> None:
+    """Read, rectify, write the picture and the report."""
+    if output is None:
+        raise click.UsageError("Missing option '-o': name a .png or .jpg file.")
+    given = None if corners == "auto" else _corners(corners)
+    photo = read_photo(image)
+    try:
+        shape = photo.pixels.shape
+        found = automatic(photo.pixels) if given is None else from_corners(shape, given)
+    except InvalidInput as error:
+        raise error.at(image) from None
+    LOG.info("%s: confidence %.2f", image, found.confidence)
+    ending = ".png" if output == "-" else Path(output).suffix.lower()
+    try:
+        data = encoded(found.picture(photo.pixels), ending)
+    except InvalidInput as error:
+        raise click.UsageError(str(error)) from None
+    if output == "-":
+        sys.stdout.buffer.write(data)
+    else:
+        write_bytes(Path(output), data)
+    if report is not None:
+        document = {
+            "homography": found.homography.tolist(), "confidence": found.confidence,
+            "size": list(found.size), "image": {"name": photo.name, "sha256": photo.sha256},
+        }  # fmt: skip
+        write_bytes(Path(report), dump_document(document))
+
+
+def _corners(text: str) -> Points:
+    pairs = re.findall(r"(-?\d+(?:\.\d+)?)\s*,\s*(-?\d+(?:\.\d+)?)", text)
+    if len(pairs) != 4 or re.sub(r"[-\d.,\s]", "", text):
+        raise click.BadParameter(f"{text!r} is not four pairs X,Y in pixels, or auto")
+    return np.array(pairs, np.float64)

@@ -1,0 +1,38 @@
+"""The body of `facade train-parser`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+
+from facade_tools.artifacts.writing import write_bytes
+from facade_tools.randomness import item_generator
+from facade_tools.segmentation.boosting import BoostOptions
+from facade_tools.segmentation.classifier import save
+from facade_tools.segmentation.conventions import convention
+from facade_tools.segmentation.patches import ForestOptions
+from facade_tools.segmentation.training import TrainOptions, read_pairs, train
+
+
+def run_training(
+    images: str, labels: str, output: str | None, seed: int, values: Mapping[str, Any]
+) -> None:
+    """Read the pairs, train, write the npz."""
+    if output is None:
+        raise click.UsageError("Missing option '-o': name a .npz file.")
+    options = TrainOptions(
+        features=values["features"], stages=values["stages"], height=values["height"],
+        pixels=values["pixels"], augment=values["augment"], balance=values["balance"],
+        boost=BoostOptions(rounds=values["rounds"]),
+        forest=ForestOptions(values["trees"], values["depth"], values["patch"]),
+    )  # fmt: skip
+    pairs = list(read_pairs(images, labels, convention(values["classes"])))
+    data = save(train(pairs, options, rng=item_generator(seed, "train-parser")))
+    if output == "-":
+        sys.stdout.buffer.write(data)
+    else:
+        write_bytes(Path(output), data)

@@ -1,0 +1,149 @@
+"""Perspective to fronto-parallel: from four corners, or from two vanishing points.
+
+A facade's horizontal and vertical lines meet in two vanishing points. With the principal point in
+the middle of the picture they fix the focal length and the plane's attitude, hence the homography
+up to scale; where they do not fix the focal length (one of them far away) a usual one is assumed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InvalidInput
+from .homography import Homography, Points, applied, fitted_homography, warped
+from .image_io import Picture
+from .rectify_lines import segments_of, vanishing_points
+
+Vector = NDArray[np.float64]  # (3,) homogeneous
+
+USUAL_FOCAL = 1.1  # of the longer side
+FOCALS = (0.35, 6.0)  # of the longer side: what a camera may have
+LEAST_CONFIDENCE = 0.35
+MOST_GROWTH = 3.0  # of a side
+LEAST_SIDE = 16  # pixels
+
+
+@dataclass(frozen=True, slots=True)
+class Rectification:
+    """homography: pixels of the photograph to pixels of the rectified picture. confidence: share
+    of line length that agrees with the two directions (1 for corners). size: (width, height).
+    """
+
+    homography: Homography
+    confidence: float
+    size: tuple[int, int]
+
+    def picture(self, photo: Picture) -> Picture:
+        """Return the rectified picture."""
+        return warped(photo, self.homography, self.size)
+
+
+def from_corners(shape: tuple[int, ...], corners: Points) -> Rectification:
+    """Return the rectification that makes four corners a rectangle, cropped to it.
+
+    corners: (4, 2) pixels, top left, top right, bottom right, bottom left. Raises InvalidInput
+    on corners that are no convex quadrilateral in that order.
+    """
+    _check_convex(corners)
+    lines = [_line(corners[i], corners[(i + 1) % 4]) for i in range(4)]
+    across, down = np.cross(lines[0], lines[2]), np.cross(lines[1], lines[3])
+    metric = _metric(shape, across, down)
+    straight = applied(metric, corners)
+    sides = np.linalg.norm(np.roll(straight, -1, axis=0) - straight, axis=1)
+    given = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
+    width, height = sides[0] + sides[2], sides[1] + sides[3]
+    # as many pixels as the photograph has there
+    scale = np.sqrt((given[0] + given[2]) * (given[1] + given[3]) / (width * height)) / 2
+    size = _size(width * scale, height * scale, shape)
+    target = np.array([[0, 0], [size[0], 0], size, [0, size[1]]], np.float64)
+    return Rectification(fitted_homography(corners, target), 1.0, size)
+
+
+def automatic(picture: Picture) -> Rectification:
+    """Return the rectification that a picture's own lines ask for.
+
+    Raises InvalidInput on pictures without enough structure.
+    """
+    if min(picture.shape[:2]) < LEAST_SIDE:
+        raise InvalidInput("is too small to show lines; name the corners")
+    lines = segments_of(picture)
+    across, down, confidence = vanishing_points(lines, picture.shape)
+    if confidence < LEAST_CONFIDENCE:
+        message = f"shows too few lines in two directions (confidence {confidence:.2f}); "
+        raise InvalidInput(message + "name the corners")
+    metric = _metric(picture.shape, across, down)
+    return _framed(picture.shape, metric, confidence)
+
+
+def _line(one: Vector, other: Vector) -> Vector:
+    return np.cross([one[0], one[1], 1.0], [other[0], other[1], 1.0])
+
+
+def _check_convex(corners: Points) -> None:
+    sides = np.roll(corners, -1, axis=0) - corners
+    following = np.roll(sides, -1, axis=0)
+    turns = sides[:, 0] * following[:, 1] - sides[:, 1] * following[:, 0]
+    if not np.isfinite(corners).all() or (turns <= 1e-6).any():
+        message = "corners are no convex quadrilateral in the order top left, top right, "
+        raise InvalidInput(message + "bottom right, bottom left")
+
+
+def _metric(shape: tuple[int, ...], across: Vector, down: Vector) -> Homography:
+    """Return the homography that undoes the perspective of a plane with two orthogonal directions.
+
+    The middle of the picture keeps its place and scale.
+    """
+    height, width = shape[:2]
+    longer = max(height, width)
+    middle = np.array([[1, 0, -width / 2], [0, 1, -height / 2], [0, 0, 1.0]])
+    one, other = _unit(middle @ across), _unit(middle @ down)
+    focal = _focal(one, other, longer)
+    camera = np.diag([1 / focal, 1 / focal, 1.0])
+    right, below = _unit(camera @ one), _unit(camera @ other)
+    right = right if right[0] > 0 else -right
+    below = below if below[1] > 0 else -below
+    below = _unit(below - right * (right @ below))
+    plane = np.diag([focal, focal, 1.0]) @ np.column_stack([right, below, [0.0, 0.0, 1.0]])
+    inverse = np.linalg.inv(plane)
+    inverse /= inverse[2, 2]
+    scale = np.sqrt(abs(np.linalg.det(inverse[:2, :2] - np.outer(inverse[:2, 2], inverse[2, :2]))))
+    metric: Homography = np.linalg.inv(middle) @ np.diag([1 / scale, 1 / scale, 1.0]) @ inverse
+    return metric @ middle
+
+
+def _unit(vector: Vector) -> Vector:
+    return vector / max(float(np.linalg.norm(vector)), 1e-300)
+
+
+def _focal(one: Vector, other: Vector, longer: int) -> float:
+    """Return the focal length for which two vanishing points are orthogonal, pixels."""
+    if min(abs(one[2]), abs(other[2])) > 1e-9:
+        square = -(one[0] * other[0] + one[1] * other[1]) / (one[2] * other[2])
+        if (FOCALS[0] * longer) ** 2 < square < (FOCALS[1] * longer) ** 2:
+            return float(np.sqrt(square))
+    return USUAL_FOCAL * longer
+
+
+def _framed(shape: tuple[int, ...], metric: Homography, confidence: float) -> Rectification:
+    """Shift a homography so that the whole picture, within limits, has positive pixels."""
+    height, width = shape[:2]
+    corners = np.array([[0, 0], [width, 0], [width, height], [0, height]], np.float64)
+    depth = np.column_stack([corners, np.ones(4)]) @ metric[2]
+    if (depth <= 0.05).any():
+        raise InvalidInput("is seen at too sharp an angle; name the corners")
+    mapped = applied(metric, corners)
+    middle = np.array([width / 2, height / 2])
+    reach = MOST_GROWTH * np.array([width, height]) / 2
+    low = np.maximum(mapped.min(axis=0), middle - reach)
+    high = np.minimum(mapped.max(axis=0), middle + reach)
+    size = _size(*(high - low), shape)
+    shift = np.array([[1, 0, -low[0]], [0, 1, -low[1]], [0, 0, 1.0]])
+    return Rectification(shift @ metric, confidence, size)
+
+
+def _size(width: float, height: float, shape: tuple[int, ...]) -> tuple[int, int]:
+    most = MOST_GROWTH * max(shape[:2])
+    return tuple(int(np.clip(round(side), 1, most)) for side in (width, height))  # type: ignore[return-value]

@@ -1,0 +1,33 @@
+"""How the shipped classifier is made: trained on rendered facades only."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..grammar.library import builtin
+from ..randomness import item_generator
+from .classifier import Classifier
+from .painting import render_facade
+from .training import Pair, TrainOptions, train
+
+GRAMMARS = ("haussmann", "haussmann-floors")
+HEIGHT = 288  # pixels, the working resolution
+
+
+def rendered_pairs(count: int, seed: int) -> Iterator[Pair]:
+    """Yield random rendered facades with their labels."""
+    grammars = [builtin(name) for name in GRAMMARS]
+    for number in range(count):
+        rng = item_generator(seed, "render", number)
+        width = int(rng.integers(90, 330))
+        _, picture, labels = render_facade(grammars[number % 2], width, HEIGHT, rng=rng)
+        yield Pair(f"rendered-{number}", picture, labels)
+
+
+def make_default(count: int = 160, seed: int = 0) -> Classifier:
+    """Return the classifier trained on `count` rendered facades."""
+    pairs = list(rendered_pairs(count, seed))
+    rng: np.random.Generator = item_generator(seed, "default-classifier")
+    return train(pairs, TrainOptions(stages=2, pixels=700), rng=rng)

@@ -1,0 +1,127 @@
+"""Training of the pixel classifier from pictures and label maps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..artifacts.parse import LABELS
+from ..errors import InvalidInput
+from ..imaging.features import Picture
+from ..imaging.image_io import PICTURES, fitted, read_photo
+from .augmentation import varied
+from .autocontext import Example, Labels, train_stages
+from .boosting import BoostOptions, train_boosted
+from .classifier import MAX_PIXELS, Classifier
+from .conventions import Convention
+from .patches import ForestOptions, train_forest
+from .trees import Codes, Trees
+
+MAX_PICTURES = 100_000
+
+
+@dataclass(frozen=True, slots=True)
+class TrainOptions:
+    """How a classifier is trained.
+
+    features: `context` or `patch`. stages: of auto-context. height: working resolution, pixels.
+    pixels: sampled a picture and variant. inner: folds by picture for the beliefs that later
+    stages train on. augment: varied copies a picture. balance: 0 weighs pixels equally, 1 gives
+    each class the same weight.
+    """
+
+    features: str = "context"
+    stages: int = 3
+    height: int = 288
+    pixels: int = 1000
+    inner: int = 2
+    augment: int = 0
+    balance: float = 0.0
+    boost: BoostOptions = field(default_factory=BoostOptions)
+    forest: ForestOptions = field(default_factory=ForestOptions)
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """A picture and its label map (our labels, 0 ignored), of one size."""
+
+    name: str
+    picture: Picture
+    labels: Labels
+
+
+def read_pairs(images: str, labels: str, convention: Convention) -> Iterator[Pair]:
+    """Yield the pictures of a folder with the label maps of the same stem in another.
+
+    Pictures without a map are left out. Raises InvalidInput where none has one or sizes differ.
+    """
+    found = sorted(p for p in Path(images).glob("*") if p.suffix.lower() in PICTURES)
+    maps = {p.stem: p for p in Path(labels).glob("*.png")}
+    both = [path for path in found if path.stem in maps]
+    if not both:
+        raise InvalidInput("holds no picture with a label map of the same name").at(images)
+    for path in both[:MAX_PICTURES]:
+        photo = read_photo(str(path))
+        known = convention.read(str(maps[path.stem]))
+        if known.shape != photo.pixels.shape[:2]:
+            raise InvalidInput("has another size than its picture").at(str(maps[path.stem]))
+        yield Pair(path.stem, photo.pixels, known)
+
+
+def train(pairs: Sequence[Pair], options: TrainOptions, *, rng: np.random.Generator) -> Classifier:
+    """Return a classifier of the labels in `pairs`. Raises InvalidInput on fewer than two."""
+    present = np.zeros(len(LABELS), np.bool_)
+    small = []
+    for pair in pairs:
+        small.append(_working(pair, options.height))
+        present[np.unique(small[-1].labels)] = True
+    known = [i for i in range(1, len(LABELS)) if present[i]]
+    if len(known) < 2 or len(pairs) < 2:
+        raise InvalidInput("needs at least two pictures and two classes to train on")
+    index = np.zeros(len(LABELS), np.uint8)
+    index[known] = np.arange(1, len(known) + 1)
+    small = [replace(pair, labels=index[pair.labels]) for pair in small]
+    classes = tuple(LABELS[i] for i in known)
+    about = f"{len(pairs)} pictures, {options.features}"
+    if options.features == "patch":
+        pictures = [(pair.picture, pair.labels) for pair in small]
+        trees = train_forest(pictures, len(classes), options.forest, options.pixels, rng=rng)
+        return Classifier("patch", classes, (trees,), options.height, options.forest.patch, about)
+    examples = list(_examples(small, options, rng))
+    seed = int(rng.integers(2**31))
+
+    def fit(codes: Codes, labels: NDArray[np.intp]) -> Trees:
+        weights = class_weights(labels, len(classes), options.balance)
+        return train_boosted(codes, labels, weights, len(classes), options.boost, seed=seed)
+
+    stages = train_stages(examples, fit, options.stages, options.pixels, rng=rng)
+    return Classifier("context", classes, stages, options.height, 0, about)
+
+
+def _working(pair: Pair, height: int) -> Pair:
+    picture = fitted(pair.picture, height, MAX_PIXELS)
+    size = (picture.shape[1], picture.shape[0])
+    labels = cv2.resize(pair.labels, size, interpolation=cv2.INTER_NEAREST).astype(np.uint8)
+    return Pair(pair.name, picture, labels)
+
+
+def _examples(
+    pairs: Sequence[Pair], options: TrainOptions, rng: np.random.Generator
+) -> Iterator[Example]:
+    for number, pair in enumerate(pairs):
+        fold = number % min(options.inner, len(pairs))
+        yield Example(pair.picture, pair.labels, fold)
+        for _ in range(options.augment):
+            yield Example(*varied(pair.picture, pair.labels, rng=rng), fold)
+
+
+def class_weights(labels: NDArray[np.intp], classes: int, balance: float) -> NDArray[np.float32]:
+    """Return weights of pixels: (mean count / count of the class) ** balance."""
+    counts = np.bincount(labels, minlength=classes).astype(np.float64)
+    weight = (counts.mean() / np.maximum(counts, 1.0)) ** balance
+    return weight[labels].astype(np.float32)

@@ -25,6 +25,7 @@ KINDS: dict[str, str] = {
     "library": "library:Library",
     "model": "model:Model",
     "parse": "parse:Parse",
+    "stylesheet": "stylesheet:StyleSheet",
 }
 
 MAX_YAML_BYTES = 4 << 20

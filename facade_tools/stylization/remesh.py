@@ -18,8 +18,10 @@ from ..geometry.arrays import Booleans, Floats, Integers, Points3, Triangles
 
 HEIGHT_TOLERANCE = 0.0005  # of the height (4.1)
 LINE_TOLERANCE = 0.004  # of the plan's larger side, between parallel walls
+FINEST = 0.1  # m: parallel walls further apart always stay apart
 THIN = 0.03  # of the height: what is lower may be a moulding
-LOST = 0.0003  # of the volume: what joining a thin slab may change
+LOST_AT_ONCE = 0.0003  # of the volume: what joining a thin slab may change
+LOST = 0.005  # of the volume: what all joining together may change
 MAX_LINES = 400
 MAX_SLABS = 400
 
@@ -70,13 +72,15 @@ def _without_thin(found: list[Slab]) -> list[Slab]:
     """
     height = found[-1].top - found[0].bottom
     volume = sum(slab.area * slab.height for slab in found)
+    left = LOST * volume
     kept = found[:1]
     for slab in found[1:]:
         below = kept[-1]
         thin = min(slab.height, below.height)
         change = plan_difference(below, slab) * max(below.area, slab.area) * thin
-        small = thin < THIN * height and change < LOST * volume
+        small = thin < THIN * height and change < min(left, LOST_AT_ONCE * volume)
         if small and below.top == slab.bottom:
+            left -= change
             plan = slab if slab.height > below.height else below
             kept[-1] = Slab(below.bottom, slab.top, plan.xs, plan.ys, plan.cells)
         else:
@@ -121,7 +125,7 @@ def _slab(triangles: Floats, bottom: float, top: float) -> Slab:
         empty = np.zeros(2)
         return Slab(bottom, top, empty, empty, np.zeros((1, 1), dtype=bool))
     size = float(np.ptp(segments.reshape(-1, 2), axis=0).max())
-    xs, ys = (_lines(segments, axis, LINE_TOLERANCE * size) for axis in (0, 1))
+    xs, ys = (_lines(segments, axis, min(LINE_TOLERANCE * size, FINEST)) for axis in (0, 1))
     cells = inside_cells(segments, 0.5 * (xs[1:] + xs[:-1]), 0.5 * (ys[1:] + ys[:-1]))
     return _trimmed(Slab(bottom, top, xs, ys, cells))
 

@@ -19,13 +19,23 @@ from ._stream import ItemStage, run_stream, side_input
     help="How many different masses an item, in order of energy.",
 )
 @click.option(
+    "--model",
+    "model_path",
+    metavar="MODEL",
+    help="Model of which attributes that PARTIAL contradicts are drawn anew.",
+)
+@click.option(
     "--require",
     type=click.FloatRange(0),
     metavar="E",
     help="Exit 4 where the mass energy stays above E; default: only report it.",
 )
 def command(
-    stream: StreamOptions, keep: str | None, candidates: int, require: float | None
+    stream: StreamOptions,
+    keep: str | None,
+    candidates: int,
+    model_path: str | None,
+    require: float | None,
 ) -> None:
     """Make mass models with roofs from attributes (FW16 6.1).
 
@@ -38,10 +48,18 @@ def command(
     from facade_tools.artifacts.store import read_one
     from facade_tools.exteriors.massgen import generate_mass
 
+    from ._learning import load_model
+
     known = None if keep is None else read_one(keep, "building")
+    model = None if model_path is None else load_model(model_path)[0]
     recorded = {"candidates": candidates, "require": require}
-    options = {"keep": known, "candidates": candidates, "require": require}
+    options = {"keep": known, "candidates": candidates, "require": require, "model": model}
     stage = ItemStage(
-        "massgen", ("attributes",), generate_mass, options, recorded, side_input(keep)
+        "massgen",
+        ("attributes",),
+        generate_mass,
+        options,
+        recorded,
+        side_input(keep) + side_input(model_path),
     )
     run_stream(stage, stream)

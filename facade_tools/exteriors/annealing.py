@@ -16,11 +16,18 @@ from .mass_attributes import GARAGE, GARAGE_AT, GENERAL, PORCH, PORCH_AT
 from .mass_energy import MOST_BOXES, Target, layout_energy
 from .mass_layout import CAPACITY, EMPTY, HEIGHT_LOCKED, PLAN_LOCKED, Layout, Work, copy_layout
 from .mass_polish import valid
-from .mass_search import EXACT, Pool, informed_round, pooled, settle
+from .mass_search import (
+    NEAT,
+    THRESHOLD,
+    Pool,
+    informed_round,
+    pooled,
+    rank,
+    settle,
+)
 from .mass_starts import add_box, box_count, free_row, holds_part, part_row
 
-THRESHOLD = 1e-3  # FW16: stop below it …
-ITERATIONS = 10_000  # … or after as many proposals
+ITERATIONS = 10_000  # proposals at most (FW16)
 RESTARTS = 3
 HOPS = 300
 FLUSH = 0.3  # share of resizes that make an edge flush with another box's
@@ -250,7 +257,7 @@ def hop(pool: Pool, target: Target, hops: int, rng: np.random.Generator, work: W
     start = pooled(pool, 0)
     layout = Layout(start.rows.copy(), start.kinds.copy(), start.locks.copy())
     for _ in range(hops):
-        if pool.energies[0] < EXACT or pool.energies[0] == np.inf:
+        if pool.energies[0] == np.inf or rank(pool.energies[0], pool.taste[0]) < NEAT:
             break
         k = int(rng.random() ** 2 * len(pool.energies))
         copy_layout(pooled(pool, k if pool.energies[k] < np.inf else 0), layout)
@@ -276,7 +283,7 @@ def search(
     has its turn.
     """
     for number in range(4 * effort[0]):
-        if number >= effort[0] and pool.energies[0] < EXACT:
+        if number >= effort[0] and rank(pool.energies[0], pool.taste[0]) < NEAT:
             break
         informed_round(pool, base, target, rng, work)
     trace = np.zeros(1)

@@ -18,6 +18,9 @@ STARTS = 300  # drawn a round
 POLISHED = 16  # of them polished
 BOX_PRICE = 0.003  # of energy: prefers the simpler of equal starts
 EXACT = 1e-8  # energies below it are equally good
+THRESHOLD = 1e-3  # of FW16: below it the attributes count as met
+DECADE, MISSED = 1.2, 8.0
+NEAT = 5.0  # of the rank: good enough to stop
 
 
 class Pool(NamedTuple):
@@ -49,10 +52,14 @@ def pooled(pool: Pool, k: int) -> Layout:
 
 
 @compiled
-def _better(energy: float, taste: float, other: float, other_taste: float) -> bool:
-    if max(energy, other) < EXACT:
-        return taste < other_taste - 1e-9
-    return energy < other * (1 - 1e-9)
+def rank(energy: float, taste: float) -> float:
+    """Return what layouts are ordered by: clumsiness, and a price for each decade of energy.
+
+    Below FW16's threshold a decade costs as much as three boxes; above it, far more.
+    """
+    decades = np.log10(max(energy, EXACT) / EXACT)
+    above = np.log10(max(energy, THRESHOLD) / THRESHOLD)
+    return float(taste + DECADE * decades + MISSED * (above + (energy >= THRESHOLD)))
 
 
 @compiled
@@ -63,7 +70,10 @@ def offer(pool: Pool, layout: Layout, energy: float, taste: float) -> None:
     for k in range(size):
         if abs(pool.taste[k] - taste) < 1e-7 and abs(pool.energies[k] - energy) < EXACT:
             return
-        if at == size and _better(energy, taste, pool.energies[k], pool.taste[k]):
+        other = np.inf
+        if pool.energies[k] < np.inf:
+            other = rank(pool.energies[k], pool.taste[k])
+        if at == size and rank(energy, taste) < other - 1e-9:
             at = k
     if at == size:
         return

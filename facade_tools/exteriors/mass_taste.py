@@ -19,6 +19,7 @@ LEAST_STEP = 0.45  # difference of eaves heights (m)
 SLIM = 2.4  # a wing or a gap thinner than this looks odd (m)
 TOWER_WIDTH = 4.6  # widest plan of a tower (m)
 TOWER_RATIO = 1.5  # of its sides at most
+SLIVER = 1.3  # … and thinner than this, absurd (m)
 CAR = 2.4  # free wall that a garage door needs (m)
 
 
@@ -105,7 +106,7 @@ def clumsiness(layout: Layout, tower: bool, work: Work) -> float:
     tower: whether one box should be small and high enough to be a tower.
     """
     total = 1.5 * _near_lines(layout) + 2.0 * _near_heights(layout)
-    total += 2.0 * thinness(work, SLIM)
+    total += 2.0 * thinness(work, SLIM) + 4.0 * thinness(work, SLIVER)
     total += 0.12 * _corners(work)
     total += 3.0 if tower and _towerless(layout) else 0.0
     for k in range(CAPACITY):

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..artifacts.attributes import Attributes
 from ..artifacts.building import Box, Building, Energy
+from ..artifacts.model import Model
 from ..errors import Infeasible
 from .annealing import RESTARTS, search
 from .mass_attributes import KINDS
@@ -44,16 +45,26 @@ def generate_mass(
     keep: Building | None = None,
     candidates: int = 1,
     require: float | None = None,
+    model: Model | None = None,
 ) -> Iterator[Building]:
     """Yield buildings (boxes and roofs, no facades) whose mass attributes are those wanted.
 
     Unknown attributes leave the search free. keep: boxes that stay exactly as they are, with
     what is `complete`; their unknown heights and roofs are filled in. candidates: how many, in
     order of energy, mutually different (see `mass_candidates`). require: raises Infeasible where
-    the best energy is above it. `energy.residuals` names the groups that the result misses.
+    the best energy is above it. model: attributes that `keep` contradicts are drawn from it anew,
+    given the others. `energy.residuals` names the groups that the result misses.
     """
     target = search_target(attributes, keep, rng=rng)
     masses = find_masses(target, keep, candidates, rng=rng)
+    if model is not None and keep is not None and masses:
+        from .mass_editing import suggestion  # the model's machinery, only where it is wanted
+
+        suited = suggestion(attributes, keep, masses[0].shares, model, rng=rng)
+        if suited is not None:
+            attributes = suited
+            target = search_target(attributes, keep, rng=rng)
+            masses = find_masses(target, keep, candidates, rng=rng)
     if require is not None and (not masses or masses[0].energy > require):
         reached = f"{masses[0].energy:.3g}" if masses else "no layout"
         raise Infeasible(f"mass energy {reached}; required at most {require:g}")

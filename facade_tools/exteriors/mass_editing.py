@@ -1,0 +1,95 @@
+"""What an edit contradicts is drawn anew from the model (the suggestions of FW16 Fig. 19)."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import replace
+
+import numpy as np
+
+from ..artifacts.attributes import Attributes, Bounds, Number, Present
+from ..artifacts.building import Building
+from ..artifacts.model import Model
+from ..errors import Infeasible
+from .attributes import attribute_vector, attributes_of_vector, building_attributes
+from .drawing import sample_attributes
+from .mass_attributes import GARAGE_AT
+from .mass_energy import GROUPS
+
+log = logging.getLogger("facade_tools.massgen")
+
+CONTRADICTED = 1e-4  # share of the energy from which a group counts as contradicted
+DIMENSIONS = ("bbox", "bcr", "bdry", "far", "arf")
+
+
+def contradicted(shares: dict[str, float]) -> tuple[str, ...]:
+    """Return the attribute groups that the best mass around an edit does not meet.
+
+    Where one of the plan's or floors' groups is among them all five are: they are not independent.
+    """
+    missed = {name for name in GROUPS if shares[name] > CONTRADICTED}
+    return tuple(
+        name
+        for name in GROUPS
+        if name in missed or (name in DIMENSIONS and missed & set(DIMENSIONS))
+    )
+
+
+def loosened(attributes: Attributes, keep: Building, groups: tuple[str, ...]) -> Attributes:
+    """Return the attributes with `groups` unknown, but for what the kept boxes say of them.
+
+    Kept garages and porches are known to be there, with their size; the kept mass bounds bbox.
+    """
+    vector = attribute_vector(attributes)
+    known = building_attributes(replace(keep, partial=True))
+    seen = attribute_vector(known)
+    for name in groups:
+        vector[GROUPS[name]] = np.nan
+    sizes = [GARAGE_AT + 6 * part + k for part in range(3) for k in (2, 3, 4)]
+    for at in sizes:
+        if not np.isnan(seen[at]):
+            vector[at] = seen[at]
+    free = attributes_of_vector(attributes.id, vector, attributes.storey_height)
+    least: tuple[float, ...] = known.bounds.bbox_min if known.bounds else (0.0, 0.0, 0.0)
+    present = known.present or Present()
+    return replace(
+        free,
+        bounds=Bounds(least),
+        present=Present(
+            garage=_present(free.mass.garage, present.garage),
+            porch_front=_present(free.mass.porch[0], present.porch_front),
+            porch_back=_present(free.mass.porch[1], present.porch_back),
+        ),
+    )
+
+
+def _present(values: tuple[Number, ...], seen: bool | None) -> bool | None:
+    if seen is not None:
+        return seen
+    return None if values[2] is None else values[2] > 0
+
+
+def suggestion(
+    attributes: Attributes,
+    keep: Building,
+    shares: dict[str, float],
+    model: Model,
+    *,
+    rng: np.random.Generator,
+) -> Attributes | None:
+    """Return attributes near the wanted ones that suit the edit; None where there is nothing to do.
+
+    shares: those of the best mass around the edit. Groups that it misses are drawn from the
+    model given all the others; None also where the model finds nothing that fits.
+    """
+    groups = contradicted(shares)
+    if not groups:
+        return None
+    given = loosened(attributes, keep, groups)
+    try:
+        (drawn,) = sample_attributes(model, 1, rng=rng, given=given)
+    except Infeasible as error:
+        log.warning("%s: the model has nothing that suits the edit: %s", attributes.id, error)
+        return None
+    log.info("%s: drawn anew from the model: %s", attributes.id, ", ".join(groups))
+    return replace(drawn, id=attributes.id)

@@ -1,0 +1,94 @@
+"""Editing: what an edit contradicts is loosened and drawn anew, the rest stays."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from facade_tools.artifacts.building import Box, Building, Element, Facade, Piece
+from facade_tools.errors import Infeasible
+from facade_tools.exteriors import mass_editing
+from facade_tools.exteriors.attributes import attribute_vector, building_attributes
+from facade_tools.exteriors.mass_editing import contradicted, loosened, suggestion
+from facade_tools.exteriors.mass_energy import GROUPS
+from facade_tools.exteriors.mass_hints import observed_zones, search_target
+from facade_tools.exteriors.massgen import generate_mass
+
+MAIN = Box("main", "general", 5, 4, 10, 8, 5.6)
+GARAGE = Box("added", "garage", 13, 2, 6, 6.5, 2.7)
+WANTED = building_attributes(Building("wanted", (MAIN,)))
+EDITED = Building("edited", (MAIN, GARAGE), partial=True)
+
+
+def shares(**missed):
+    return dict.fromkeys((*GROUPS, "topology", "thickness"), 0.0) | missed
+
+
+def test_plan_groups_are_contradicted_together():
+    assert contradicted(shares()) == ()
+    assert contradicted(shares(garage=0.2)) == ("garage",)
+    assert contradicted(shares(bcr=0.01)) == ("bbox", "bcr", "bdry", "far", "arf")
+
+
+def test_loosened_keeps_what_is_not_contradicted_and_what_is_seen():
+    free = loosened(WANTED, EDITED, ("bbox", "garage"))
+    assert free.mass.bbox == (None, None, None)
+    assert free.mass.bcr == WANTED.mass.bcr
+    assert free.mass.garage == (None, None, 6, 6.5, 2.7, None)
+    assert free.present.garage is True
+    assert free.present.porch_front is False
+    assert free.bounds.bbox_min == (16, pytest.approx(9.25), 5.6)
+    assert free.element == WANTED.element
+
+
+def test_suggestion_draws_only_where_something_is_contradicted(monkeypatch):
+    asked = []
+
+    def draw(model, n, *, rng, given):
+        asked.append(given)
+        yield replace(building_attributes(Building("x", (MAIN, GARAGE))), id="0-0")
+
+    monkeypatch.setattr(mass_editing, "sample_attributes", draw)
+    rng = np.random.default_rng(0)
+    assert suggestion(WANTED, EDITED, shares(), None, rng=rng) is None
+    assert not asked
+    (building,) = generate_mass(WANTED, rng=rng, keep=EDITED, model=object())
+    assert asked[0].id == "wanted"
+    assert building.id == "wanted"
+    assert building.energy.mass < 1e-5
+    assert attribute_vector(building.targets)[11] == 6
+    assert {b.id for b in building.boxes} >= {"main", "added"}
+
+
+def test_suggestion_survives_a_model_that_has_nothing(monkeypatch, caplog):
+    def draw(model, n, *, rng, given):
+        raise Infeasible("no such house")
+        yield
+
+    monkeypatch.setattr(mass_editing, "sample_attributes", draw)
+    found = suggestion(WANTED, EDITED, shares(garage=1.0), None, rng=np.random.default_rng(0))
+    assert found is None
+    assert "no such house" in caplog.text
+
+
+def test_nothing_is_built_before_an_observed_wall():
+    window = Element("window", "sash", 4.0, 0.9, 1.2, 1.4, known=True)
+    wall = Piece("front-1", "main", (0.0, 0.0, 0.0), 10.0, 3.0, (window,))
+    seen = Building("seen", (MAIN,), {"front": Facade((wall,))}, partial=True)
+    (zone,) = observed_zones(seen)
+    assert zone.tolist() == [0, -3, 10, 0]
+    wider = building_attributes(Building("w", (MAIN, replace(MAIN, id="b", x=8, y=9))))
+    for seed in range(3):
+        (building,) = generate_mass(wider, rng=np.random.default_rng(seed), keep=seen)
+        assert building.facades == seen.facades
+        for box in building.boxes[1:]:
+            assert box.y - box.depth / 2 >= 0 or abs(box.x - 5) >= 5 + box.width / 2 - 1e-6
+
+
+def test_complete_parts_are_not_added():
+    target = search_target(
+        WANTED, replace(EDITED, complete=("mass",)), rng=np.random.default_rng(0)
+    )
+    assert target.extra == 0

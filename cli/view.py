@@ -11,11 +11,13 @@ from ._options import StreamOptions, stream_options
 # Kind of artifact -> function(artifact) that returns a Scene or an RGB picture (h, w, 3) uint8.
 # One line a kind; the function's module loads when an artifact of the kind is drawn.
 DRAWINGS = {
-    "building": "facade_tools.geometry.details:building_scene",
+    "building": "facade_tools.geometry.details:building_sketch",
     "footprint": "facade_tools.geometry.details:footprint_scene",
     "layout": "facade_tools.layering.drawing:layout_picture",
     "attributes": "facade_tools.imaging.attribute_glyphs:attribute_glyph",
 }
+
+MOST_PIXELS = 16_000_000
 
 
 def _size(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[int, int] | None:
@@ -23,7 +25,12 @@ def _size(ctx: click.Context, param: click.Parameter, value: str | None) -> tupl
     match = re.fullmatch(r"(\d{2,4})x(\d{2,4})", value or "")
     if value is not None and match is None:
         raise click.BadParameter(f"{value!r} is not WxH in pixels, like 640x480", ctx, param)
-    return None if match is None else (int(match[1]), int(match[2]))
+    if match is None:
+        return None
+    width, height = int(match[1]), int(match[2])
+    if width * height > MOST_PIXELS:
+        raise click.BadParameter(f"{value} is more than {MOST_PIXELS:,} pixels", ctx, param)
+    return width, height
 
 
 @click.command()

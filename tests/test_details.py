@@ -9,12 +9,20 @@ import catalogue
 import numpy as np
 import pytest
 import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from facade_tools.artifacts.building import Box, Building, Chimney, Element, Facade, Piece, Roof
+from facade_tools.errors import InvalidInput
 from facade_tools.geometry.detail_boxes import box_triangles, side_frame
 from facade_tools.geometry.detail_roofs import THICKNESS, roof_slabs
 from facade_tools.geometry.detail_volumes import porch, prism
-from facade_tools.geometry.details import building_scene, footprint_scene, signed_volume
+from facade_tools.geometry.details import (
+    building_scene,
+    building_sketch,
+    footprint_scene,
+    signed_volume,
+)
 from facade_tools.geometry.openings import openings_of, pierced
 from facade_tools.geometry.scenes import bounds, shifts
 from facade_tools.geometry.solids import building_solid, triangulated
@@ -191,6 +199,29 @@ def test_chimney_is_made_of_closed_parts():
     meshes = parts(building_scene(building), "chimney-1")
     assert {mesh.material for mesh in meshes} == {"brick", "stone", "clay"}
     assert max(mesh.vertices[:, 2].max() for mesh in meshes) == pytest.approx(7.14)
+
+
+@given(
+    kind=st.sampled_from(["window", "door", "garage-door"]),
+    style=st.sampled_from([*WINDOWS, "panel", "patio"]),
+    width=st.floats(0.01, 12.0),
+    height=st.floats(0.01, 6.0),
+)
+@settings(max_examples=60, deadline=None)
+def test_an_element_of_any_size_is_made_of_outward_closed_parts(kind, style, width, height):
+    element = Element(kind, style, 1.0, 0.5, width, height)
+    for mesh in building_scene(house(element)).meshes:
+        if mesh.name.startswith("front/"):
+            assert trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).is_watertight
+            assert signed_volume(mesh) > 0.0
+
+
+def test_an_unknown_height_is_sketched_but_not_exported():
+    box = Box("main", "general", 0.0, 0.0, 6.0, 6.0)
+    building = Building("part", (box,), storey_height=2.5, partial=True)
+    assert parts(building_sketch(building), "mass")[0].vertices[:, 2].max() == 2.5
+    with pytest.raises(InvalidInput, match="height"):
+        building_scene(building)
 
 
 def test_partial_building_without_facades_and_roof_is_drawn():

@@ -218,7 +218,12 @@ def test_a_mesh_file_is_drawn(facade, tmp_path):
 
 @pytest.mark.parametrize(
     ("arguments", "code"),
-    [(["-o", "x.gif"], 2), ([], 2), (["-o", "x.png", "--size", "big"], 2)],
+    [
+        (["-o", "x.gif"], 2),
+        ([], 2),
+        (["-o", "x.png", "--size", "big"], 2),
+        (["-o", "x.png", "--size", "9999x9999"], 2),
+    ],
 )
 def test_wrong_usage(facade, tmp_path, arguments, code):
     done = facade("view", "-", *arguments, stdin=stream(HOUSE), cwd=tmp_path)

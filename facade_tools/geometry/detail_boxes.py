@@ -71,11 +71,15 @@ def box_triangles(boxes: Sequence[Box6]) -> tuple[Points3, Triangles]:
 
 
 def meshes_of(name: str, parts: Mapping[str, Sequence[Box6]], frame: LocalFrame) -> list[Mesh]:
-    """Return one mesh a material, all called `name`, in world coordinates."""
+    """Return one mesh a material, all called `name`, in world coordinates.
+
+    Boxes without a volume, into which the parts of a tiny element shrink, are left out.
+    """
     out = []
     for material, boxes in parts.items():
-        if boxes:
-            vertices, faces = box_triangles(boxes)
+        solid = [box for box in boxes if all(box[k + 3] - box[k] > 1e-6 for k in range(3))]
+        if solid:
+            vertices, faces = box_triangles(solid)
             out.append(Mesh(name, frame.world(vertices), faces, material))
     return out
 

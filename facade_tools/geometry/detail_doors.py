@@ -64,7 +64,7 @@ def _panels(u0: float, v0: float, u1: float, v1: float) -> list[Box6]:
         for low, high in ((v0, cut - rail), (cut + rail, v1)):
             out += ring(a, low, b, high, 0.02, (LEAF, LEAF + PANEL))
             out.append((a + 0.05, low + 0.05, LEAF, b - 0.05, high - 0.05, LEAF + PANEL))
-    return [box for box in out if box[3] > box[0] and box[4] > box[1]]
+    return out
 
 
 def garage_door_parts(element: Element) -> Parts:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import zlib
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -32,8 +33,7 @@ PLINTH = 0.22  # height of the foundation that shows, metres
 def building_scene(building: Building) -> Scene:
     """Return the scene of a building: `mass` is its closed solid, all else named parts.
 
-    A partial building is drawn as far as it is known. Raises InvalidInput where no mass can be
-    built.
+    Raises InvalidInput where no mass can be built, as of a partial building without heights.
     """
     solid = building_solid(building)
     overhang = {box.id: box.roof.overhang for box in building.boxes if box.roof is not None}
@@ -50,6 +50,14 @@ def building_scene(building: Building) -> Scene:
     for index, stack in enumerate(building.chimneys, 1):
         meshes += chimney(f"chimney-{index}", stack, 0.0)
     return Scene(building.id, tuple(meshes), materials(colors, pattern))
+
+
+def building_sketch(building: Building) -> Scene:
+    """Return the scene of a building, whole or partial: unknown heights are one storey."""
+    boxes = tuple(
+        box if box.height else replace(box, height=building.storey_height) for box in building.boxes
+    )
+    return building_scene(replace(building, boxes=boxes))
 
 
 def footprint_scene(footprint: Footprint) -> Scene:

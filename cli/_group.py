@@ -26,6 +26,8 @@ STAGES: dict[str, Stage] = {
     "facadegen": Stage("facadegen", CHAIN, "Put windows and doors on buildings."),
     "layer-solve": Stage("layer_solve", CHAIN, "Facades as a stack of layers of patterns."),
     "parse-image": Stage("parse_image", CHAIN, "Read photographs of facades by a grammar."),
+    "capture-style": Stage("capture_style", CHAIN, "The look of a textured building as a sheet."),
+    "retarget": Stage("retarget", CHAIN, "Put a captured look onto another structure."),
     "attributes": Stage("attributes", SUPPORT, "Compute the 49 attributes of buildings."),
     "train-parser": Stage("train_parser", SUPPORT, "Train the pixel classifier of parse-image."),
     "sample-grammar": Stage("sample_grammar", SUPPORT, "Draw random facades of a split grammar."),

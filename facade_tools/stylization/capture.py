@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -35,7 +34,6 @@ from .structure import cuts
 STOREY = 3.0  # m, to count the floors of a block
 LOW = 0.35  # of the height: a lowest or highest block below this is a bottom or a top
 WALL_SIDES: tuple[Side, ...] = ("front", "right", "back", "left")
-log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,22 +69,39 @@ class _Part:
     high: Floats
 
 
-def capture_style(mesh: TexturedMesh, identity: str, options: CaptureOptions) -> Capture:
-    """Capture the style of a model. Raises InvalidInput where it is no Manhattan building."""
+@dataclass(frozen=True, slots=True)
+class Structure:
+    """A model in its standard view, cut into slabs and blocks."""
+
+    standard: Standard
+    slabs: list[Slab]
+    parts: list[_Part]
+    blocks: Blocks
+
+
+def structure(mesh: TexturedMesh, identity: str, options: CaptureOptions) -> Structure:
+    """Return the structure of a model (4.1, 4.2). Raises InvalidInput for no Manhattan building."""
     standard = standard_view(mesh, options.front, options.up)
     found = slabs(standard.mesh.vertices, standard.mesh.faces)
     parts = _parts(found)
-    roles = block_roles([float(p.high[2] - p.low[2]) for p in parts], options.bottom, options.top)
+    heights = [float(part.high[2] - part.low[2]) for part in parts]
+    roles = block_roles(heights, options.bottom, options.top)
+    frame = tuple(tuple(float(v) for v in row) for row in standard.frame)
+    return Structure(standard, found, parts, Blocks(identity, _blocks(parts, roles), frame))
+
+
+def capture_style(mesh: TexturedMesh, identity: str, options: CaptureOptions) -> Capture:
+    """Capture the style of a model. Raises InvalidInput where it is no Manhattan building."""
+    model = structure(mesh, identity, options)
+    standard, found, parts = model.standard, model.slabs, model.parts
     faces = [face for index, slab in enumerate(found) for face in wall_faces(slab, index)]
     density = working_density(standard.mesh, faces)
     drawn = face_pictures(standard.mesh, faces, density)
     pictures = {f"textures/face-{i}.png": picture for i, (picture, _) in enumerate(drawn)}
     low, high = _plan(parts)
     pictures["textures/roof.png"] = top_picture(standard.mesh, low, high, density)
-    sheet = _sheet(identity, standard, found, parts, roles, faces, drawn, density, options.window)
-    frame = tuple(tuple(float(v) for v in row) for row in standard.frame)
-    blocks = Blocks(identity, _blocks(parts, roles), frame)
-    return Capture(sheet, blocks, pictures)
+    sheet = _sheet(model, faces, drawn, density, options.window)
+    return Capture(sheet, model.blocks, pictures)
 
 
 def _parts(found: Sequence[Slab]) -> list[_Part]:
@@ -138,16 +153,13 @@ def _storeys(part: _Part) -> int:
 
 
 def _sheet(
-    identity: str,
-    standard: Standard,
-    found: Sequence[Slab],
-    parts: Sequence[_Part],
-    roles: Sequence[BlockRole],
+    model: Structure,
     faces: Sequence[WallFace],
     drawn: Sequence[tuple[Picture, float]],
     density: float,
     window: float | None,
 ) -> StyleSheet:
+    identity, standard, parts = model.blocks.id, model.standard, model.parts
     pictures = [picture for picture, _ in drawn]
     rows, columns = horizontal_groups(faces), vertical_groups(faces, pictures)
     groups, rules = _rules(faces, pictures, rows, columns, window)
@@ -155,14 +167,13 @@ def _sheet(
     notes = [*standard.mesh.notes]
     if lost > WORTH_SAYING:
         notes.append(f"{lost:.0%} of the surface is oblique or sloped: approximated by steps")
-        log.warning("%s: %s", identity, notes[-1])
     return StyleSheet(
         identity,
         tuple(
-            StyleBlock(f"block-{i}", role, tuple((part.high - part.low).tolist()), _storeys(part))
-            for i, (part, role) in enumerate(zip(parts, roles, strict=True))
+            StyleBlock(block.id, block.role, (block.width, block.depth, block.height), block.floors)
+            for block in model.blocks.blocks
         ),
-        tuple(_floor(found[k], i, part) for i, part in enumerate(parts) for k in part.slabs),
+        tuple(_floor(model.slabs[k], i, part) for i, part in enumerate(parts) for k in part.slabs),
         tuple(
             _wall(side, i, part, faces, rows, columns)
             for i, part in enumerate(parts)

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..artifacts.blocks import Block
+from ..artifacts.stylesheet import StyleBlock
 from ..geometry.arrays import Floats, Integers
 
 LEAST_CHANGE = 1.05  # of floor area, for a cut (CONTRACT)
@@ -62,6 +64,24 @@ def match_blocks(
         candidates = same or list(range(len(source_roles)))
         chosen.append(min(candidates, key=lambda i: (costs[i, j], i)))
     return chosen
+
+
+def chosen_style(
+    styles: Sequence[Sequence[StyleBlock]],
+    target: Sequence[Block],
+    *,
+    rng: np.random.Generator,
+) -> int:
+    """Return the index of one of several styles, drawn with odds of 1 over its mean cost Ψ.
+
+    Alike structures are likely, others possible; with one style there is nothing to draw.
+    """
+    if len(styles) == 1:
+        return 0
+    goal = np.array([(block.width, block.depth, block.height) for block in target])
+    costs = [match_costs(np.array([b.size for b in s]), goal).min(axis=0).mean() for s in styles]
+    odds = 1 / np.array(costs)
+    return int(rng.choice(len(styles), p=odds / odds.sum()))
 
 
 def snapped(upper: Floats, lower: Floats, width: float) -> Floats:

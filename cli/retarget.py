@@ -1,0 +1,48 @@
+"""`facade retarget`: a style sheet onto another structure."""
+
+from __future__ import annotations
+
+import click
+
+from ._options import output, seed
+
+
+@click.command()
+@click.argument("style", metavar="STYLE_DIR")
+@click.argument("bases", nargs=-1, required=True, metavar="BASE...")
+@output
+@click.option(
+    "--styles",
+    multiple=True,
+    metavar="STYLE_DIR",
+    help="Further style sheets (repeatable): each base takes one of all by similarity and seed.",
+)
+@click.option(
+    "--resize",
+    multiple=True,
+    metavar="BLOCK=WxDxH",
+    help="New width, depth and height of a block, metres (repeatable).",
+)
+@seed
+def command(
+    style: str,
+    bases: tuple[str, ...],
+    output: str | None,
+    styles: tuple[str, ...],
+    resize: tuple[str, ...],
+    seed: int,
+) -> None:
+    """Put the look of a style sheet onto buildings of another structure (LNSW13).
+
+    BASE is blocks.json (of a style sheet, or hand-written), buildings (.json, .jsonl, -), or a
+    mesh. PATH is a .glb or .obj file, or a folder that gets a GLB a base.
+
+    \b
+    Example:
+      facade retarget tower-style houses.jsonl -o styled/
+    """
+    from ._style import run_retarget
+
+    if output is None:
+        raise click.UsageError("Missing option '-o': name a .glb, an .obj or a folder.")
+    run_retarget((style, *styles), bases, output, resize, seed)

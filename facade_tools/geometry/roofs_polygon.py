@@ -10,13 +10,12 @@ import shapely
 from facade_tools.artifacts.building import Roof
 from facade_tools.artifacts.footprint import Footprint
 
-from .arrays import Floats
 from .polygons import Rings, rings_of, sound
+from .roofs_gables import gable_edges, turns
 from .roofs_patch import FLAT, Patch, Plane, mansard_profile, slope_of
 from .skeleton import Contour, Skeleton, SkeletonFailed, straight_skeleton
 
 LOG = logging.getLogger("facade_tools.geometry")
-OPPOSITE = -0.8  # cosine of the angle between the two walls beside a gable
 
 
 def footprint_patches(footprint: Footprint) -> list[Patch]:
@@ -82,14 +81,7 @@ def _raised(distance: Plane, slope: float, base: float) -> Plane:
 
 
 def _is_convex(contour: Contour) -> bool:
-    return bool(np.all(_turns(contour) > -1e-9))
-
-
-def _turns(contour: Contour) -> Floats:
-    """Return the sine of the turn at the end of each edge, positive to the left."""
-    along, _, _ = contour.frames()
-    after = along[contour.following]
-    return np.asarray(along[:, 0] * after[:, 1] - along[:, 1] * after[:, 0])
+    return bool(np.all(turns(contour) > -1e-9))
 
 
 def _pyramid(contour: Contour, eaves: float, rise: float) -> list[Patch]:
@@ -106,12 +98,11 @@ def _pyramid(contour: Contour, eaves: float, rise: float) -> list[Patch]:
     ]
 
 
-# --- gables ---------------------------------------------------------------------------------------
 def _gabled(
     rings: Rings, contour: Contour, skeleton: Skeleton, roof: Roof
 ) -> tuple[Contour, Skeleton]:
     """Return contour and skeleton with gables at the ends; hipped where that has no roof."""
-    ends = gable_edges(contour, skeleton, roof)
+    ends = gable_edges(rings, roof.direction)
     speeds = np.ones(len(contour.points))
     speeds[ends] = 0.0
     try:
@@ -119,29 +110,6 @@ def _gabled(
     except SkeletonFailed:
         LOG.info("no roof with gables at edges %s: hipped instead", ends)
         return contour, skeleton
-
-
-def gable_edges(contour: Contour, skeleton: Skeleton, roof: Roof) -> list[int]:
-    """Return the edges that get a gable: ends whose hip is a triangle between facing walls.
-
-    Where several meet, those come first that the ridge's direction runs into.
-    """
-    along, _, _ = contour.frames()
-    before = np.empty(len(along), dtype=np.int64)
-    before[contour.following] = np.arange(len(along))
-    facing = np.sum(along[before] * along[contour.following], axis=1) < OPPOSITE
-    turns = _turns(contour)
-    convex = (turns > 1e-6) & (turns[before] > 1e-6)
-    small = np.array([len(face) == 3 for face in skeleton.faces])
-    if len(along) == 4:
-        small[:] = True
-    axis = along[:, 0 if roof.direction == "x" else 1]
-    chosen: list[int] = []
-    for k in np.argsort(np.round(np.abs(axis), 6), kind="stable").tolist():
-        neighbours = {int(before[k]), int(contour.following[k])}
-        if facing[k] and convex[k] and small[k] and not neighbours & set(chosen):
-            chosen.append(k)
-    return chosen
 
 
 # --- mansards -------------------------------------------------------------------------------------

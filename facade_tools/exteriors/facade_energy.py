@@ -206,7 +206,7 @@ def _least_symmetry(side: Side, wall: float) -> tuple[float, Floats]:
             count += 1
         if side.room[p, OPEN] > 0.0 or symmetric(side.pieces[p, 4], own):
             base += area
-    largest = np.argsort(free)[::-1][: min(count, 12)]
+    largest = np.argsort(free, kind="mergesort")[::-1][: min(count, 12)]
     if np.isnan(target):
         return 0.0, plan
     least, best = np.inf, 0

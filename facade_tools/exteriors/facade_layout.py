@@ -21,6 +21,7 @@ GAP = 0.16  # wall between two elements (m)
 LOWEST_SILL = 0.1  # over the storey's floor or the roof below (m)
 LEAST_HEIGHT = 0.45  # of a window (m)
 AIR = 0.002  # so that rounding to millimetres touches nothing (m)
+SPARE = 0.05  # share of draws that take any size of window
 SQUEEZE = 0.75  # an element is placed where it has at least this share of its usual width
 
 SUB, CENTRE, LOWER, TALL, CLEAR = range(5)  # columns of a genome's element
@@ -56,8 +57,12 @@ class Side(NamedTuple):
 def pick(rng: np.random.Generator, side: Side, p: int, doors: bool) -> int:
     """Return a substyle drawn by its weight in the storey of piece p; −1 where there is none.
 
-    doors: whether doors may be drawn too.
+    doors: whether doors may be drawn too. Now and then it is any window, also one of the spare
+    sizes that weigh nothing: some targets cannot be met without.
     """
+    if rng.random() < SPARE:
+        any_one = int(rng.random() * len(side.subs))
+        return any_one if side.subs[any_one, DOOR] == 0.0 else -1
     column = ABOVE if side.room[p, UPPER] > 0.0 else GROUND
     total = 0.0
     for k in range(len(side.subs)):
@@ -319,11 +324,15 @@ def _fill(
     other, at = sub, -1
     if m and rng.random() < 0.3:
         other, at = pick(rng, side, p, True), int(rng.random() * m)
-        if side.subs[other, DOOR] > 0.0 and even:
+        if other < 0:
+            at = -1
+        elif side.subs[other, DOOR] > 0.0 and even:
             at = m // 2 if m % 2 == 1 else -1
     for k in range(m):
-        special = k == at or (even and k == m - 1 - at and side.subs[other, DOOR] == 0.0)
-        n = place(side, p, other if special and at >= 0 else sub, centres[k], row, n)
+        special = k == at or (
+            at >= 0 and even and k == m - 1 - at and side.subs[other, DOOR] == 0.0
+        )
+        n = place(side, p, other if special else sub, centres[k], row, n)
     return n
 
 

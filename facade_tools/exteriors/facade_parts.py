@@ -55,7 +55,10 @@ class MainDoor:
 
 
 def part_rows(library: Library, entry: LibraryBuilding) -> list[PartRow]:
-    """Return the substyles of a library building by level; the last row is the main door's."""
+    """Return the substyles of a library building by level; the last row is the main door's.
+
+    Spare sizes without weight stand before it, for targets that the others cannot meet.
+    """
     rows = []
     windows = [p for p in entry.parts if library.substyles[p.substyle].kind != "garage-door"]
     for index, level in sorted({(p.substyle, p.level) for p in windows}):
@@ -70,7 +73,21 @@ def part_rows(library: Library, entry: LibraryBuilding) -> list[PartRow]:
     if not any(row.kind == "window" for row in rows):
         weights = {(side, level): 1.0 for side in ("front", "back", "end") for level in (0, 1)}
         rows.append(PartRow("window", "casement", 1.2, 1.3, weights))
-    return [*rows, _main_door(library, entry)]
+    return [*rows, *_spare(library, rows), _main_door(library, entry)]
+
+
+def _spare(library: Library, rows: Sequence[PartRow]) -> list[PartRow]:
+    """Return the smallest and largest size of each window style in use, with no weight."""
+    spare = []
+    for style in sorted({row.style for row in rows if row.kind == "window"}):
+        sizes = [
+            (s.width * s.height, s.width, s.height)
+            for s in library.substyles
+            if (s.kind, s.style) == ("window", style)
+        ]
+        for _, width, height in sorted({min(sizes), max(sizes)}) if sizes else ():
+            spare.append(PartRow("window", style, width, height, {}))
+    return spare
 
 
 def _main_door(library: Library, entry: LibraryBuilding) -> PartRow:

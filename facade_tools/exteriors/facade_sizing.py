@@ -36,7 +36,7 @@ def sized(
         slope[i] = share[i] / weight[i]
         breaks[2 * i] = (low[i] - wanted[i]) / slope[i]
         breaks[2 * i + 1] = (high[i] - wanted[i]) / slope[i]
-    order = np.argsort(breaks)
+    order = np.argsort(breaks, kind="mergesort")
     reached = 0.0  # Σ b x(µ) at the breakpoint before
     for i in range(n):
         reached += share[i] * low[i]

@@ -103,7 +103,7 @@ def evolve(
     done = 0
     best = fitness.min()
     while done < generations and still < patience:
-        order = np.argsort(fitness)
+        order = np.argsort(fitness, kind="mergesort")
         if done >= least and values[order[0]] <= enough:
             break
         for i in range(size):

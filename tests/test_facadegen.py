@@ -1,0 +1,301 @@
+"""facadegen: exact sizing, sound facades that meet their targets, completion, library, colours."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from facade_tools.artifacts.attributes import FacadeAttributes
+from facade_tools.artifacts.building import SIDES, Box, Building, Colors, Roof
+from facade_tools.artifacts.documents import encode
+from facade_tools.artifacts.numbers import dump_line
+from facade_tools.artifacts.store import read
+from facade_tools.errors import Infeasible, InvalidInput
+from facade_tools.exteriors.attributes import building_attributes
+from facade_tools.exteriors.facade_energy import energy
+from facade_tools.exteriors.facade_sizing import sized
+from facade_tools.exteriors.facadegen import FacadeOptions, generate_facades
+from facade_tools.exteriors.genetic import Search
+from facade_tools.exteriors.library import build_library, default_library, kmeans
+from facade_tools.exteriors.palette import house_colors
+from facade_tools.geometry.checks import building_problems
+from facade_tools.geometry.pieces import facade_pieces
+
+ROOT = Path(__file__).parent.parent
+HOUSES = ROOT / "sample_data" / "houses"
+STYLES = ("bungalow", "two_storey_gable", "victorian", "modern_flat", "split_garage")
+
+
+def sample(style: str, number: int = 0) -> Building:
+    return list(read([str(HOUSES / f"{style}.jsonl")], "building"))[number]
+
+
+def bare(building: Building) -> Building:
+    """The mass of a house with its own attributes as targets."""
+    targets = building_attributes(building)
+    return replace(building, facades={}, targets=targets, colors=None, energy=None)
+
+
+def made(building: Building, seed: int = 0, **options) -> list[Building]:
+    rng = np.random.default_rng(seed)
+    return list(generate_facades(building, FacadeOptions(**options), rng=rng))
+
+
+def elements(building: Building):
+    return [
+        (side, piece, element)
+        for side, facade in building.facades.items()
+        for piece in facade.pieces
+        for element in piece.elements
+    ]
+
+
+# --- sizing -------------------------------------------------------------------------------------
+
+
+@st.composite
+def programmes(draw):
+    n = draw(st.integers(1, 8))
+    floats = st.floats(0.2, 3.0)
+    wanted, share = (np.array(draw(st.lists(floats, min_size=n, max_size=n))) for _ in range(2))
+    weight = np.array(draw(st.lists(st.integers(1, 6), min_size=n, max_size=n)), dtype=float)
+    part = draw(st.floats(0.0, 1.0))
+    low, high = 0.5 * wanted, 1.5 * wanted
+    total = (1 - part) * (share * low).sum() + part * (share * high).sum()
+    return wanted, share, weight, low, high, float(total)
+
+
+@given(programmes())
+@settings(max_examples=150, deadline=None)
+def test_sizes_keep_bounds_and_total_and_no_pair_can_do_better(programme):
+    wanted, share, weight, low, high, total = programme
+    sizes = sized(*programme)
+    assert (sizes >= low - 1e-12).all()
+    assert (sizes <= high + 1e-12).all()
+    assert share @ sizes == pytest.approx(total, abs=1e-9)
+    # The optimum of a convex programme: one multiplier for all sizes between their bounds.
+    pull = weight * (sizes - wanted) / share
+    inner = (sizes > low + 1e-9) & (sizes < high - 1e-9)
+    if inner.any():
+        level = pull[inner].mean()
+        assert pull[inner] == pytest.approx(level, abs=1e-6)
+        assert (pull[sizes <= low + 1e-9] >= level - 1e-6).all()
+        assert (pull[sizes >= high - 1e-9] <= level + 1e-6).all()
+    assert np.array_equal(sizes, sized.py_func(*programme))
+
+
+def test_sizes_agree_with_a_quadratic_programming_library():
+    import daqp
+
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        n = int(rng.integers(2, 9))
+        wanted, share = rng.uniform(0.5, 2, n), rng.uniform(0.5, 2, n)
+        weight = rng.integers(1, 5, n).astype(float)
+        low, high = 0.5 * wanted, 1.5 * wanted
+        total = float(rng.uniform(share @ low, share @ high))
+        upper, lower = np.append(high, total), np.append(low, total)
+        sense = np.array([0] * n + [5], dtype=np.int32)
+        hessian, linear = np.diag(weight), -weight * wanted
+        solution, *_ = daqp.solve(hessian, linear, share[None].copy(), upper, lower, sense)
+        sizes = sized(wanted, share, weight, low, high, total)
+        assert sizes == pytest.approx(np.array(solution), abs=1e-6)
+
+
+def test_totals_out_of_reach_stop_at_the_bounds():
+    one = np.ones(3)
+    assert sized(one, one, one, 0.5 * one, 1.5 * one, 0.1).tolist() == [0.5] * 3
+    assert sized(one, one, one, 0.5 * one, 1.5 * one, 9.0).tolist() == [1.5] * 3
+    assert len(sized(*(np.empty(0),) * 5, 1.0)) == 0
+
+
+# --- facades ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_facades_are_sound_and_meet_their_targets(style):
+    mass = bare(sample(style, 3))
+    before = dump_line(encode(mass))
+    (house,) = made(mass)
+    assert list(building_problems(house)) == []
+    assert dump_line(encode(mass)) == before
+    assert house.energy is not None
+    assert house.energy.facade < 1e-2
+    reached = building_attributes(house).facade
+    assert house.energy.facade == pytest.approx(energy(reached, mass.targets.facade))
+    for value, target in zip(reached.wwr, mass.targets.facade.wwr, strict=True):
+        assert value == pytest.approx(target, abs=0.02)
+
+
+def test_heads_line_up_in_a_storey_on_all_sides():
+    (house,) = made(bare(sample("colonial")))
+    kinds = {box.id: box.kind for box in house.boxes}
+    heads: dict[int, set[float]] = {}
+    for _, piece, e in elements(house):
+        if e.kind == "window" and kinds[piece.box] == "general":
+            storey = int((piece.origin[2] + 1e-6) // house.storey_height)
+            heads.setdefault(storey, set()).add(round(piece.origin[2] + e.v + e.height, 2))
+    assert all(len(values) == 1 for values in heads.values()), heads
+
+
+def test_garage_gets_its_door_and_the_front_its_entrance():
+    (house,) = made(bare(sample("ranch_l")))
+    kinds = {box.id: box.kind for box in house.boxes}
+    doors = [(piece, e) for _, piece, e in elements(house) if e.kind == "garage-door"]
+    assert doors
+    assert all(kinds[piece.box] == "garage" and e.v == 0 for piece, e in doors)
+    mains = [(side, e.v) for side, _, e in elements(house) if e.main]
+    assert mains == [("front", 0.0)]
+
+
+def test_without_targets_the_library_gives_them():
+    (house,) = made(replace(bare(sample("cape")), targets=None))
+    assert list(building_problems(house)) == []
+    assert house.energy.facade is not None
+    assert {side for side, *_ in elements(house)} == set(SIDES)
+
+
+def test_same_seed_same_bytes_other_seed_other_house():
+    mass = bare(sample("farmhouse"))
+    first, again, other = (dump_line(encode(made(mass, seed)[0])) for seed in (1, 1, 2))
+    assert first == again
+    assert first != other
+
+
+def test_compiled_search_walks_the_path_of_the_plain_one():
+    from facade_tools.exteriors import genetic
+
+    mass = bare(sample("bungalow"))
+    short = Search(population=12, elite=3, generations=3)
+    (fast,) = made(mass, search=short)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(genetic, "evolve", genetic.evolve.py_func)
+        (plain,) = made(mass, search=short)
+    assert dump_line(encode(fast)) == dump_line(encode(plain))
+
+
+def test_candidates_differ_and_are_numbered():
+    houses = made(bare(sample("cape", 2)), candidates=3)
+    assert [house.id for house in houses] == [f"cape-03-{k}" for k in (1, 2, 3)]
+    assert len({dump_line(encode(replace(house, id="same"))) for house in houses}) == 3
+
+
+def test_partial_building_is_refused_with_advice():
+    partial = Building("p", (Box("a", "general", 0, 0, 8, 8),), partial=True)
+    with pytest.raises(InvalidInput, match="massgen"):
+        made(partial)
+
+
+def test_two_wall_box_meets_the_least_energy_that_its_pieces_allow():
+    """Arbitrary symmetry targets on a cube: one piece a side, symmetric or not."""
+    cube = Building("cube", (Box("a", "general", 0, 0, 8, 8, 3, Roof("flat")),))
+    empty = building_attributes(cube)
+    for wwr, sym in product((0.1, 0.25), (0.0, 0.5, 0.8, 1.0)):
+        wanted = FacadeAttributes((wwr,) * 4, (sym,) * 4, (None,) * 4)
+        (house,) = made(replace(cube, targets=replace(empty, facade=wanted)))
+        least = 4 * min(((s - sym) / max(sym, 0.1)) ** 2 for s in (0.0, 1.0))
+        assert house.energy.facade == pytest.approx(least, abs=1e-2)
+
+
+# --- completion ---------------------------------------------------------------------------------
+
+
+def test_kept_front_stays_to_the_bit_and_the_rest_is_made():
+    whole = sample("two_storey_gable", 1)
+    front = {"front": whole.facades["front"]}
+    keep = Building(whole.id, whole.boxes, front, whole.storey_height, partial=True)
+    (house,) = made(bare(whole), keep=keep)
+    old = [replace(e, known=True) for p in front["front"].pieces for e in p.elements]
+    new = [e for p in house.facades["front"].pieces for e in p.elements]
+    assert new == old
+    assert {side for side, *_ in elements(house)} == set(SIDES)
+    assert list(building_problems(house)) == []
+
+
+def test_known_element_without_a_wall_is_infeasible():
+    whole = sample("two_storey_gable", 1)
+    far = replace(whole.boxes[0], depth=whole.boxes[0].depth + 1.0)
+    keep = replace(whole, partial=True)
+    with pytest.raises(Infeasible, match="known"):
+        made(replace(bare(whole), boxes=(far, *whole.boxes[1:])), keep=keep)
+
+
+# --- library and colours ------------------------------------------------------------------------
+
+
+def test_kmeans_finds_separated_groups():
+    rng = np.random.default_rng(0)
+    centres = np.array([[0, 0], [5, 0], [0, 5], [5, 5.0]])
+    points = np.concatenate([c + rng.normal(0, 0.1, (30, 2)) for c in centres])
+    found, label = kmeans(points, 4)
+    assert sorted(np.round(found).tolist()) == sorted(centres.tolist())
+    assert sorted(np.bincount(label).tolist()) == [30] * 4
+
+
+def test_library_has_at_most_five_sizes_a_style():
+    library = default_library().library
+    counts: dict[tuple[str, str], int] = {}
+    for row in library.substyles:
+        counts[row.kind, row.style] = counts.get((row.kind, row.style), 0) + 1
+    assert max(counts.values()) == 5
+    assert len(library.buildings) == 288
+
+
+def test_shipped_library_is_that_of_the_sample_houses():
+    library = build_library(read([str(HOUSES)], "building"), "library")
+    shipped = ROOT / "facade_tools" / "exteriors" / "library.json"
+    assert (
+        json.loads(dump_line(encode(library)))["buildings"]
+        == (json.loads(shipped.read_bytes())["buildings"])
+    )
+
+
+def test_similar_building_has_the_same_bits():
+    shelf = default_library()
+    wanted = building_attributes(sample("victorian", 5))
+    for entry in shelf.nearest(wanted, 3, np.random.default_rng(0)):
+        assert entry.id.startswith("victorian")
+
+
+def test_library_of_windowless_buildings_is_refused():
+    with pytest.raises(InvalidInput, match="window"):
+        build_library([Building("b", (Box("a", "general", 0, 0, 8, 8, 3, Roof("flat")),))])
+
+
+def test_colours_come_from_the_template_and_given_ones_stay():
+    entry = default_library().library.buildings[0]
+    colors = house_colors([entry], rng=np.random.default_rng(0))
+    assert (colors.trim, colors.door) == (entry.colors.trim, entry.colors.door)
+    given_colors = Colors("#112233", "#445566", "#778899", "#aabbcc")
+    (house,) = made(replace(bare(sample("cape")), colors=given_colors))
+    assert house.colors == given_colors
+
+
+# --- command ------------------------------------------------------------------------------------
+
+
+def test_command_on_a_stream_with_a_library_of_its_own(facade, tmp_path):
+    masses = tmp_path / "masses.jsonl"
+    masses.write_bytes(b"".join(dump_line(encode(bare(sample("cape", k)))) for k in (0, 1)))
+    library = str(HOUSES / "cape.jsonl")
+    done = facade("facadegen", masses, "--library", library, "--seed", 4)
+    assert done.returncode == 0, done.stderr
+    rows = [json.loads(line) for line in done.stdout.splitlines()]
+    assert [row["id"] for row in rows] == ["cape-01", "cape-02"]
+    names = [source["name"] for source in rows[0]["provenance"]["inputs"]]
+    assert names == ["masses.jsonl", "cape.jsonl"]
+    assert rows[0]["provenance"]["seed"] == 4
+
+
+def test_pieces_of_the_result_are_those_of_the_mass():
+    (house,) = made(bare(sample("victorian")))
+    for side, pieces in facade_pieces(house).items():
+        stripped = tuple(replace(p, elements=()) for p in house.facades[side].pieces)
+        assert stripped == pieces

@@ -144,7 +144,7 @@ def _stored(rows: Iterator[Any]) -> Floats:
         file.flush()
         if not count:
             return np.empty((0, 3))
-        return np.memmap(file, dtype=np.float64, mode="r", shape=(count, 3))
+        return np.asarray(np.memmap(file, dtype=np.float64, mode="r", shape=(count, 3)))
 
 
 def _packed(batch: list[Any]) -> Floats:

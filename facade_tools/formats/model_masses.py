@@ -13,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 from ..artifacts.building import Box, BoxKind, Chimney, Roof
 from ..geometry.rectilinear import areas, partition
 from .surfaces import Model, Surface, bounds, told
-from .surfaces_roofs import Plane, bodies, eaves_height, height_at, roof_of, roof_plane
+from .surfaces_roofs import Plane, bodies, eaves_height, heights_at, roof_of, roof_plane
 
 DETAIL_AREA = 6.0  # m²: a roof body smaller than this, above another one, is a dormer
 DETAIL_SHARE = 0.12  # of the footprint: likewise
@@ -181,9 +181,8 @@ def _chimney(
     if not CHIMNEY_SIDE[0] <= min(width, depth) <= max(width, depth) <= CHIMNEY_SIDE[1]:
         return None
     corners = [(a, b) for a in (low[0], high[0]) for b in (low[1], high[1])]
-    around = [height_at(planes, np.array(corner)) for corner in (*corners, (x, y))]
-    heights = [height for height in around if height is not None]
-    if around[-1] is None or high[2] < max(heights) + CHIMNEY_RISE:
+    around = heights_at(planes, np.array([(x, y), *corners]))
+    if np.isnan(around[0]) or high[2] < np.nanmax(around) + CHIMNEY_RISE:
         return None
     size = round(width, 3), round(depth, 3)
     return Chimney(round(x, 3), round(y, 3), *size, round(float(high[2]) - ground, 3))

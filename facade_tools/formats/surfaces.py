@@ -33,10 +33,9 @@ class Surface:
     @cached_property
     def vector_area(self) -> Floats:
         """Normal times area (m²), of the outer ring (Newell)."""
-        ring = self.rings[0] - self.rings[0][0]
-        following = np.roll(ring, -1, axis=0)
-        total: Floats = 0.5 * np.cross(ring, following).sum(axis=0)
-        return total
+        fan = (self.rings[0][1:] - self.rings[0][0]).T
+        (a, b, c), (d, e, f) = fan[:, :-1], fan[:, 1:]
+        return 0.5 * np.array([b @ f - c @ e, c @ d - a @ f, a @ e - b @ d])
 
     @property
     def area(self) -> float:
@@ -124,6 +123,7 @@ def ring(points: Any) -> Points3 | None:
     array = np.asarray(points, dtype=np.float64).reshape(-1, 3)
     if len(array) and np.array_equal(array[0], array[-1]):
         array = array[:-1]
-    apart = np.any(array != np.roll(array, 1, axis=0), axis=1)
+    apart = np.ones(len(array), dtype=bool)
+    apart[1:] = (array[1:] != array[:-1]).any(axis=1)
     kept = array[apart]
     return kept if len(kept) >= 3 else None

@@ -12,7 +12,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from ..artifacts.building import Axis, Roof, RoofStyle
-from ..geometry.arrays import Floats
+from ..geometry.arrays import Floats, Points2
 from ..geometry.rectilinear import areas
 from .surfaces import Surface
 
@@ -111,13 +111,13 @@ def eaves_height(planes: Sequence[Plane], plan: BaseGeometry) -> float:
     gable's ends rise above the eaves, its sides are at least a third of the outline.
     """
     points = _outline_points(plan)
-    heights = [h for point in points if (h := height_at(planes, point)) is not None]
-    if not heights:
+    heights = heights_at(planes, points)
+    if np.isnan(heights).all():
         return float(min(ring[:, 2].min() for p in planes for ring in p.surface.rings))
-    return float(np.quantile(heights, 0.1))
+    return float(np.nanquantile(heights, 0.1))
 
 
-def _outline_points(plan: BaseGeometry) -> Floats:
+def _outline_points(plan: BaseGeometry) -> Points2:
     inside = areas(plan.buffer(-INSET))
     border = (plan if inside.is_empty else inside).boundary
     count = max(12, min(200, int(border.length / 0.3)))
@@ -126,15 +126,15 @@ def _outline_points(plan: BaseGeometry) -> Floats:
     return shapely.get_coordinates(points)
 
 
-def height_at(planes: Sequence[Plane], point: Floats) -> float | None:
-    """Return the height of the highest plane above or below a plan point; None outside all."""
-    spot = shapely.Point(point)
-    found = [
-        plane.coefficients[0] * point[0] + plane.coefficients[1] * point[1] + plane.coefficients[2]
-        for plane in planes
-        if plane.plan.intersects(spot)
-    ]
-    return float(max(found)) if found else None
+def heights_at(planes: Sequence[Plane], points: Points2) -> Floats:
+    """Return the height of the highest plane above or below plan points (n, 2); NaN outside all."""
+    highest = np.full(len(points), -np.inf)
+    x, y = points.T
+    for plane in planes:
+        a, b, c = plane.coefficients
+        over = shapely.intersects_xy(plane.plan, x, y)
+        highest = np.where(over, np.maximum(highest, a * x + b * y + c), highest)
+    return np.where(np.isinf(highest), np.nan, highest)
 
 
 def roof_of(planes: Sequence[Plane], area: BaseGeometry, code: str, notes: Counter[str]) -> Roof:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from .roofs_box import box_roof, rectangle_of
 from .roofs_patch import Patch, Rectangle
-from .roofs_polygon import footprint_patches
+from .roofs_polygon import footprint_patches, sloped_patches, truncated
 from .roofs_union import union_patches
 
 __all__ = [
@@ -13,5 +13,7 @@ __all__ = [
     "box_roof",
     "footprint_patches",
     "rectangle_of",
+    "sloped_patches",
+    "truncated",
     "union_patches",
 ]

@@ -23,7 +23,7 @@ from .serialisation import network_of
 POOL = 2000  # draws of which --top keeps the most probable
 POOL_EACH = 50  # and at least this many for each that is kept
 DISTINCT = 0.05  # standard deviations by which the most probable differ from each other
-LIMIT = 200_000  # draws that may be turned down for one that is taken
+LIMIT = 50_000  # draws that may be turned down for one that is taken
 
 
 @dataclass(frozen=True, slots=True)

@@ -114,6 +114,15 @@ def grow(task: Task, fit: Local, iterations: int = 60) -> Local:
     return improve(task, best, iterations)
 
 
+def shrink(task: Task, fit: Local, iterations: int = 60) -> Local:
+    """Return the fit with one cluster less: the lightest gives its rows to the others."""
+    clusters = fit.clusters
+    lightest = int(np.argmin(task.weight @ clusters))
+    rest = np.delete(clusters, lightest, axis=1) + NOTHING
+    rest = rest / rest.sum(axis=1, keepdims=True)
+    return improve(task, evaluate(task, refit(task, fit.family, rest)), iterations)
+
+
 def _trial(task: Task, fit: Local, clusters: Floats) -> Local:
     family = refit(task, fit.family, clusters)
     return improve(task, evaluate(task, family), TRIAL)

@@ -14,10 +14,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from . import mixture, styles
+from . import em, mixture, styles
 from .coordinates import Floats
 from .dataset import Dataset, Scaling
-from .em import Prior, statistics
+from .em import Prior, Stop, statistics
 from .layout import Layout
 from .mixture import Local, Task
 from .network import Network, Weights
@@ -26,6 +26,7 @@ from .styles import Evidence, Rows, Upper
 
 log = logging.getLogger(__name__)
 
+TOGETHER = Stop(relative=1e-5, iterations=30)
 KNOWN_SHARE = 0.98  # a feature is a parent only where this share of the child's rows knows it
 Inputs = tuple[int, ...]
 
@@ -99,6 +100,8 @@ class Search:
         task = self.task(g)
         if size == 1:
             fit = mixture.single(task, inputs, tied=self.tied)
+        elif (g, size + 1, inputs) in self.families and (g, size - 1, inputs) not in self.families:
+            fit = mixture.shrink(task, self.families[(g, size + 1, inputs)][0])
         else:
             fit = mixture.grow(task, self.family(g, size - 1, inputs)[0])
         return fit, self.part(g, fit)
@@ -314,6 +317,20 @@ def _best_edge(
     return best
 
 
+def pruned(search: Search, state: State) -> State:
+    """Drop every lateral edge whose absence raises the score."""
+    owners = parent_of(search.layout)
+    pairs = [
+        (g, p) for g, features in enumerate(state.inputs) for p in {owners[f] for f in features}
+    ]
+    for g, parent in sorted(pairs):
+        rest = tuple(f for f in state.inputs[g] if owners[f] != parent)
+        after = with_edge(search, state, g, rest)
+        if after.score > state.score:
+            state = after
+    return state
+
+
 def with_edge(search: Search, state: State, g: int, inputs: Inputs) -> State:
     """Return the configuration after group g takes `inputs`, with the best of nearby sizes."""
     size = state.sizes[g]
@@ -337,11 +354,33 @@ def warm(search: Search, g: int, size: int, before: Inputs, after: Inputs) -> No
 # --- the search ---------------------------------------------------------------------------------
 
 
+def refreshed(search: Search, state: State) -> State:
+    """Return the configuration with families that EM has fitted together, not one by one."""
+    fit = em.run(
+        search.network(state), search.data, search.prior, weights=search.weights, stop=TOGETHER
+    )
+    network = fit.network
+    for g, family in enumerate(network.families):
+        alone = replace(family, hidden=(network.style @ family.hidden)[None])
+        local = mixture.evaluate(search.task(g), alone)
+        key = (g, state.sizes[g], state.inputs[g])
+        for stale in [k for k in search.families if k[0] == g and k != key]:
+            del search.families[stale]
+            search.scaled.pop(stale, None)
+        search.families[key] = (local, search.part(g, local))
+        search.scaled.pop(key, None)
+    hidden = np.concatenate([family.hidden for family in network.families], axis=1)
+    shown = search.evidence(state.sizes, state.inputs)
+    upper = styles.expect(search.rows, shown, network.style, network.bits, hidden)
+    return search.state(upper, state.sizes, state.inputs, 3)
+
+
 def search_structure(search: Search) -> State:
     """Return the configuration of the highest score.
 
     S from least to largest without edges; lateral edges at the best; S again with these edges;
-    edges once more.
+    edges once more; edges that have become needless are dropped. Then the same again from families
+    that have been through EM together.
     """
     none: tuple[Inputs, ...] = tuple(() for _ in search.layout.groups)
     best = max(sweep(search, start(search, none)), key=lambda state: state.score)
@@ -351,6 +390,9 @@ def search_structure(search: Search) -> State:
     best = greedy_edges(search, best)
     again = max(sweep(search, start(search, best.inputs)), key=lambda state: state.score)
     best = max(best, again, key=lambda state: state.score)
-    best = climb(search, greedy_edges(search, best))
+    best = pruned(search, climb(search, greedy_edges(search, best)))
+    fresh = refreshed(search, best)
+    fresh = pruned(search, climb(search, greedy_edges(search, pruned(search, fresh))))
+    best = max(best, fresh, key=lambda state: state.score)
     log.info("S %d, sizes %s, score %.1f", len(best.upper.style), best.sizes, best.score)
     return best

@@ -1,0 +1,101 @@
+"""The three commands as a user runs them: learn, sample, evaluate."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("chain")
+
+
+@pytest.fixture(scope="module")
+def attributes(folder):
+    """Sixty of the sample houses as a stream."""
+    from facade_tools.artifacts.documents import encode
+    from facade_tools.artifacts.numbers import dump_line
+    from facade_tools.exteriors.prior import shipped_prior
+
+    path = folder / "attributes.jsonl"
+    path.write_bytes(b"".join(dump_line(encode(row)) for row in shipped_prior()[::5]))
+    return path
+
+
+def run(facade_script, *words, code=0, stdin=b""):
+    import subprocess
+
+    done = subprocess.run([facade_script, *map(str, words)], input=stdin, capture_output=True)
+    assert done.returncode == code, done.stderr.decode()
+    return done
+
+
+@pytest.fixture(scope="module")
+def model(facade_script, folder, attributes):
+    path = folder / "model.json"
+    run(
+        facade_script, "learn", attributes, "--variant", "no-lateral", "-o", path,
+        "--report", folder / "report.html",
+    )  # fmt: skip
+    return path
+
+
+def test_learn_sample_evaluate_in_a_pipe(facade_script, model, attributes):
+    drawn = run(facade_script, "sample", model, "-n", 4).stdout
+    assert drawn == run(facade_script, "sample", model, "-n", 4).stdout
+    rows = [json.loads(line) for line in drawn.splitlines()]
+    assert [row["id"] for row in rows] == ["0-0", "0-1", "0-2", "0-3"]
+    assert rows[0]["provenance"]["stage"] == "sample"
+    found = json.loads(run(facade_script, "evaluate", model, "-", stdin=drawn).stdout)
+    assert set(found) == {"n", "nll", "per_building"}
+    assert found["n"] == 4
+    assert found["nll"] == pytest.approx(sum(found["per_building"]) / 4)
+    known = -rows[0]["sample"]["log_density"]
+    assert found["per_building"][0] == pytest.approx(known, abs=1e-6)
+    assert run(facade_script, "evaluate", model, attributes).returncode == 0
+
+
+def test_the_same_seed_learns_the_same_bytes(facade_script, folder, model, attributes):
+    again = folder / "again.json"
+    run(facade_script, "learn", attributes, "--variant", "no-lateral", "-o", again)
+    assert again.read_bytes() == model.read_bytes()
+
+
+def test_report_is_self_contained(model, folder):
+    page = (folder / "report.html").read_text()
+    assert "<svg" in page
+    assert "src=" not in page
+    assert "<script" not in page
+
+
+def test_completion_of_a_hand_written_part(facade_script, folder, model):
+    partial = folder / "partial.yaml"
+    partial.write_text(
+        "schema: facade-tools/attributes/1\nid: mine\nmass: {bbox: [12.0, null, null]}\n"
+    )
+    out = run(facade_script, "sample", model, "--given", partial, "--top", "-n", 2).stdout
+    rows = [json.loads(line) for line in out.splitlines()]
+    assert [row["mass"]["bbox"][0] for row in rows] == [12.0, 12.0]
+    assert b"null" not in out.replace(b'"style":null', b"")
+
+
+def test_bad_input_is_one_line_and_exit_3(facade_script, folder, model):
+    document = json.loads(model.read_text())
+    document["style"][0] += 0.5
+    (folder / "broken.json").write_text(json.dumps(document))
+    for words in (
+        ("sample", folder / "broken.json"),
+        ("sample", folder / "missing.json"),
+        ("learn", model),
+        ("evaluate", model, model),
+    ):
+        done = run(facade_script, *words, code=3)
+        assert done.stderr.decode().count("\n") == 1
+        assert done.stderr.decode().startswith(f"facade {words[0]}: error:")
+
+
+def test_nothing_observed_is_invalid(facade_script, folder, model):
+    (folder / "empty.json").write_text('{"schema": "facade-tools/attributes/1", "id": "e"}')
+    run(facade_script, "evaluate", model, folder / "empty.json", code=3)

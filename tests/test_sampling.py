@@ -1,0 +1,206 @@
+"""Draws: physically possible, repeatable, conditioned exactly; completion keeps what is given."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from facade_tools.artifacts.attributes import Attributes, Bounds, ElementAttributes, Present
+from facade_tools.artifacts.documents import encode
+from facade_tools.artifacts.numbers import Given, dump_line
+from facade_tools.artifacts.validation import check
+from facade_tools.errors import Infeasible, InvalidInput
+from facade_tools.exteriors.conditioning import draw_given
+from facade_tools.exteriors.coordinates import read_attributes
+from facade_tools.exteriors.drawing import SampleOptions, sample_attributes
+from facade_tools.exteriors.evaluation import negative_log_density
+from facade_tools.exteriors.learning import LearnOptions, learn_model
+from facade_tools.exteriors.prior import shipped_prior
+from facade_tools.exteriors.serialisation import network_of
+
+
+@pytest.fixture(scope="module")
+def houses():
+    return shipped_prior()
+
+
+@pytest.fixture(scope="module")
+def model(houses):
+    return learn_model(houses[::3], rng=np.random.default_rng(0), options=LearnOptions(largest=4))
+
+
+@pytest.fixture(scope="module")
+def plain(houses):
+    """Without lateral edges: every conditional is exact."""
+    options = LearnOptions(variant="no-lateral", largest=4)
+    return learn_model(houses[::3], rng=np.random.default_rng(0), options=options)
+
+
+def draw(model, n, seed=0, given=None, **options):
+    rng = np.random.default_rng(seed)
+    return list(sample_attributes(model, n, rng=rng, given=given, options=SampleOptions(**options)))
+
+
+def assert_possible(a: Attributes) -> None:
+    (w, d, h), m = a.mass.bbox, a.mass
+    assert min(w, d, h) > 0
+    assert 0 < m.bcr <= 1
+    assert m.far * m.arf[0] == pytest.approx(m.bcr)
+    assert m.arf[0] >= m.arf[1] >= m.arf[2] >= 0
+    assert sum(m.arf) == pytest.approx(1)
+    assert m.bdry * np.sqrt(m.bcr * w * d) >= 2 * (w + d) * (1 - 1e-9)
+    px, py, gw, gd, gh, exposure = m.garage
+    if gw:
+        assert gw / w / 2 - 1e-9 <= px <= 1 - gw / w / 2 + 1e-9
+        assert gd / d / 2 - 1e-9 <= py <= 1 - gd / d / 2 + 1e-9
+        assert gh <= h * (1 + 1e-9)
+        assert 0 <= exposure <= 1
+    for porch, back in zip(m.porch, (False, True), strict=True):
+        assert not any(porch) or (porch[1] >= 0.5) == back
+    assert all(0 <= x < 1 for x in a.facade.wwr)
+    assert all(0 <= x <= 1 for x in (*a.facade.sym, *a.facade.align))
+    assert any(a.element.roof.values())
+    check(json.loads(dump_line(encode(a))), "attributes")
+
+
+@pytest.mark.parametrize("variant", ["full", "flat", "gmm", "no-middle", "faithful"])
+def test_every_sample_is_possible(houses, model, variant):
+    if variant != "full":
+        faithful = variant == "faithful"
+        options = LearnOptions(
+            variant="full" if faithful else variant, faithful=faithful, largest=2
+        )
+        model = learn_model(houses[::6], rng=np.random.default_rng(0), options=options)
+    for sample in draw(model, 300):
+        assert_possible(sample)
+
+
+def test_sample_i_does_not_depend_on_how_many(model):
+    few, many = draw(model, 5), draw(model, 2000)
+    assert [dump_line(encode(a)) for a in few] == [dump_line(encode(a)) for a in many[:5]]
+    assert [a.id for a in many[:2]] == ["0-0", "0-1"]
+    assert draw(model, 0) == []
+
+
+def test_log_density_of_a_sample_is_what_evaluate_says(model):
+    samples = draw(model, 50)
+    found = -negative_log_density(model, samples)
+    assert [a.sample.log_density for a in samples] == pytest.approx(found.tolist(), abs=1e-6)
+
+
+def test_neighbours_name_training_buildings(model, houses):
+    ids = {h.id for h in houses[::3]}
+    for sample in draw(model, 20):
+        assert set(sample.sample.neighbours.values()) <= ids
+        assert "bbox" in sample.sample.neighbours
+
+
+def test_style_is_fixed(model):
+    assert {a.sample.style for a in draw(model, 50, style=1)} == {1}
+    with pytest.raises(InvalidInput, match="expected one of"):
+        draw(model, 1, style=99)
+
+
+def test_exact_conditioning_agrees_with_rejection(plain, houses):
+    """P(garage, hip | one-storey, gable) by conditioning and by throwing away other draws."""
+    bits = ElementAttributes(roof={"flat": None, "gable": 1, "hip": None})
+    given = Attributes("g", mass=replace(houses[0].mass.__class__(), bcr=1.0), element=bits)
+    drawn = draw(plain, 1500, given=given, neighbours=False)
+    assert all(a.sample.effective is None for a in drawn)
+    free = [
+        a
+        for a in draw(plain, 8000, seed=1, neighbours=False)
+        if a.mass.bcr == 1.0 and a.element.roof["gable"] == 1
+    ]
+    for measure in (
+        lambda a: bool(a.mass.garage[2]),
+        lambda a: a.element.roof["hip"],
+        lambda a: a.mass.arf[1] == 0,
+        lambda a: a.mass.bbox[2] > 5,
+    ):
+        ours, theirs = np.mean([measure(a) for a in drawn]), np.mean([measure(a) for a in free])
+        assert ours == pytest.approx(theirs, abs=4.5 * np.sqrt(0.25 / len(free)) + 0.03)
+
+
+def test_weighted_draws_average_to_the_density(model, plain, houses):
+    """Where lateral parents are unobserved the weights' mean is the density; elsewhere each is."""
+    network = network_of(plain)
+    row = read_attributes([houses[0]], network.layout)
+    particles = draw_given(network, row, 50, rng=np.random.default_rng(0))
+    assert particles.exact
+    exact = -negative_log_density(plain, [houses[0]])[0]
+    assert particles.log_weight == pytest.approx(np.full(50, exact), abs=1e-6)
+    network = network_of(model)
+    hidden = replace(houses[0], facade=replace(houses[0].facade, wwr=(None,) * 4))
+    row = read_attributes([hidden], network.layout)
+    means = [
+        np.logaddexp.reduce(
+            draw_given(network, row, 4000, rng=np.random.default_rng(seed)).log_weight
+        )
+        for seed in (1, 2)
+    ]
+    assert means[0] == pytest.approx(means[1], abs=0.3)
+
+
+def test_completion_keeps_what_is_given_to_the_last_bit(model, houses):
+    width = Given("11.123456789012344")
+    mass = replace(houses[30].mass, bbox=(width, None, 5.5), far=None, arf=(None,) * 3, bdry=None)
+    given = Attributes("p", mass=mass, storey_height=2.75, present=Present(garage=True))
+    for sample in draw(model, 5, given=given, top=True):
+        assert sample.mass.bbox[0] is width
+        assert sample.mass.bbox[2] == 5.5
+        assert sample.mass.garage == mass.garage
+        assert sample.mass.porch == mass.porch
+        assert sample.storey_height == 2.75
+        text = dump_line(encode(sample)).decode()
+        assert "11.123456789012344" in text
+        assert "null" not in text
+        assert sample.present is None
+
+
+def test_bounds_are_hard(model):
+    given = Attributes("b", bounds=Bounds((9.0, 9.0, 4.0)))
+    for sample in draw(model, 30, given=given):
+        assert all(x >= least for x, least in zip(sample.mass.bbox, (9, 9, 4), strict=True))
+    with pytest.raises(Infeasible):
+        draw(model, 1, given=Attributes("b", bounds=Bounds((900.0, 9.0, 4.0))))
+
+
+def test_present_with_unknown_measures(model):
+    given = Attributes("g", present=Present(garage=True, porch_front=False))
+    for sample in draw(model, 20, given=given):
+        assert sample.mass.garage[2] > 0
+        assert sample.mass.porch[0] == (0.0,) * 6
+
+
+def test_far_without_floors_is_met(model):
+    mass = replace(Attributes("x").mass, bcr=0.8, far=1.4)
+    for sample in draw(model, 20, given=Attributes("f", mass=mass)):
+        assert sample.mass.far == 1.4
+        assert 1.4 * sample.mass.arf[0] == pytest.approx(0.8)
+
+
+def test_top_is_sorted_and_distinct(model):
+    samples = draw(model, 10, top=True)
+    density = [a.sample.log_density for a in samples]
+    assert density == sorted(density, reverse=True)
+    assert len({a.mass.bbox for a in samples}) == 10
+    assert min(density) > np.median([a.sample.log_density for a in draw(model, 200)])
+
+
+def test_min_distance_keeps_samples_apart(model):
+    from facade_tools.exteriors.completion import distances
+    from facade_tools.exteriors.neighbours import Neighbours
+
+    samples = draw(model, 20, min_distance=0.5)
+    network = network_of(model)
+    finder = Neighbours(model, network)
+    points = finder.whole(read_attributes(samples, network.layout))
+    gaps = distances(points, points) + 9 * np.eye(20)
+    assert gaps.min() >= 0.49
+    assert distances(points, finder.training()).min() >= 0.49
+    with pytest.raises(Infeasible):
+        draw(model, 5, min_distance=50.0)

@@ -39,8 +39,8 @@ class Part:
 
     form: str
 
-    def __call__(self, item: RawItem) -> Any:
-        """Read the item and convert it; raises InvalidInput with its place."""
+    def __call__(self, item: RawItem) -> tuple[Any, Any]:
+        """Return the item converted, and its frame; raises InvalidInput with its place."""
         table = CITY if self.form == "cityjson" else SCENES
         artifact = item.artifact(*table)
         try:
@@ -49,7 +49,9 @@ class Part:
             raise error.at(item.source, item.line) from None
         except FacadeError as error:
             raise type(error)(f"{artifact.id}: {error}") from None
-        return replace(part, note=_note(artifact)) if self.form == "obj" else part
+        if self.form == "obj":
+            part = replace(part, note=_note(artifact))
+        return part, getattr(artifact, "frame", None)
 
 
 def _note(artifact: Any) -> str:
@@ -61,11 +63,13 @@ class Files:
     """Makes all files of an item's own model."""
 
     form: str
+    arrange: str
 
     def __call__(self, item: RawItem) -> tuple[str, dict[str, bytes]]:
         """Return the item's id and the bytes of its files by name."""
-        part = Part(self.form)(item)
-        return part.name, model_files([part], file_name(part.name), self.form)
+        part, frame = Part(self.form)(item)
+        files = model_files(placed([part], self.arrange, [frame]), file_name(part.name), self.form)
+        return part.name, files
 
 
 def run_export(stream: StreamOptions, form: str | None, arrange: str) -> None:
@@ -76,7 +80,7 @@ def run_export(stream: StreamOptions, form: str | None, arrange: str) -> None:
     if output == "-":
         _to_stdout(stream, form or "glb", arrange)
     elif _ending(output) is None and is_folder(output):
-        _to_folder(stream, Path(output), form or "glb")
+        _to_folder(stream, Path(output), Files(form or "glb", arrange))
     else:
         _to_file(stream, Path(output), form or _ending(output), arrange)
 
@@ -87,9 +91,9 @@ def _ending(output: str) -> str | None:
     return next((form for form, end in ENDINGS.items() if output.lower().endswith(end)), None)
 
 
-def _to_folder(stream: StreamOptions, folder: Path, form: str) -> None:
+def _to_folder(stream: StreamOptions, folder: Path, convert: Files) -> None:
     seen: set[str] = set()
-    for identity, files in each("export", Files(form), stream):
+    for identity, files in each("export", convert, stream):
         if file_name(identity) in seen:
             raise InvalidInput(f"id {identity!r} stands twice; expected unique ids in a folder")
         seen.add(file_name(identity))
@@ -119,12 +123,13 @@ def _to_stdout(stream: StreamOptions, form: str, arrange: str) -> None:
 
 
 def _parts(stream: StreamOptions, form: str, arrange: str) -> list[Any]:
-    parts = list(each("export", Part(form), stream))
+    pairs = list(each("export", Part(form), stream))
+    parts, frames = [part for part, _ in pairs], [frame for _, frame in pairs]
     names = [part.name for part in parts]
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
         raise InvalidInput(f"id {twice!r} stands twice; expected unique ids in one file")
-    arranged: list[Any] = placed(parts, arrange)
+    arranged: list[Any] = placed(parts, arrange, frames)
     return arranged
 
 

@@ -19,6 +19,7 @@ from facade_tools.formats.png import write as write_png
 from facade_tools.geometry.mesh import Scene
 from facade_tools.imaging.camera import View
 from facade_tools.imaging.contact_sheet import SIDE_VIEWS, contact_sheet
+from facade_tools.imaging.mass_views import mass_pictures
 from facade_tools.imaging.page import Exhibit, page
 from facade_tools.imaging.render import Picture, render
 
@@ -38,6 +39,7 @@ class ViewOptions:
     size: tuple[int, int] | None
     columns: int | None
     sides: bool
+    mass: bool
     no_labels: bool
 
 
@@ -46,6 +48,7 @@ class Drawing:
     """Makes what an item looks like: its name and a Scene or picture; pictures where asked for."""
 
     views: tuple[View, ...] = ()
+    mass: bool = False
 
     def __call__(self, item: RawItem) -> tuple[str, Any]:
         """Return the item's id and its drawing, or its pictures from all views."""
@@ -54,11 +57,19 @@ class Drawing:
             return name, self.seen(drawn)
         artifact = item.artifact(*DRAWINGS)
         try:
-            return artifact.id, self.seen(load(DRAWINGS[artifact.kind])(artifact))
+            drawn = self.seen(load(DRAWINGS[artifact.kind])(artifact))
+            beside = self.beside(artifact)
+            return artifact.id, drawn + beside if beside else drawn
         except InvalidInput as error:
             raise error.at(item.source, item.line) from None
         except FacadeError as error:
             raise type(error)(f"{artifact.id}: {error}") from None
+
+    def beside(self, artifact: Any) -> list[Picture]:
+        """Return what --mass adds to the picture of a building."""
+        if not (self.mass and self.views and artifact.kind == "building"):
+            return []
+        return mass_pictures(artifact, self.views[0].size)
 
     def seen(self, drawing: Any) -> Any:
         """Return pictures of a drawing from the views; without views the drawing itself."""
@@ -95,30 +106,33 @@ def _sheet(stream: StreamOptions, options: ViewOptions) -> Picture:
     labels: list[str] = []
     for name, seen in _rendered(stream, options):
         pictures += seen
-        labels += [name] * len(seen) if len(seen) == 1 else _side_labels(name, len(seen))
+        labels += _labels(name, len(seen), options)
         if len(pictures) > MOST_PICTURES:
             raise InvalidInput(f"more than {MOST_PICTURES} pictures; draw fewer items at a time")
     if len(pictures) == 1:
         return pictures[0]
-    columns = options.columns or (4 if options.sides else None)
+    columns = options.columns or (4 if options.sides else 3 if options.mass else None)
     return contact_sheet(pictures, [] if options.no_labels else labels, columns)
 
 
-def _side_labels(name: str, count: int) -> list[str]:
-    return [f"{name} {side}" for side in list(SIDE_VIEWS)[:count]]
+def _labels(name: str, count: int, options: ViewOptions) -> list[str]:
+    """Return the labels of one item's pictures."""
+    sides = [f"{name} {side}" for side in SIDE_VIEWS] if options.sides else [name]
+    return [*sides, "boxes", "mass energy"][:count] if count > 1 else [name]
 
 
 def _rendered(stream: StreamOptions, options: ViewOptions) -> Any:
     """Yield id and pictures of each item; a single item gets the larger picture."""
     several = (400, 300)
-    if options.size is None and not options.sides:
+    if options.size is None and not (options.sides or options.mass):
         first_two: list[tuple[str, Any]] = []
         for drawn in each("view", Drawing(), stream):
             first_two.append(drawn)
         size = (960, 720) if len(first_two) == 1 else several
         drawing = Drawing(_views(options, size))
         return [(name, drawing.seen(shown)) for name, shown in first_two]
-    return each("view", Drawing(_views(options, options.size or several)), stream)
+    views = _views(options, options.size or several)
+    return each("view", Drawing(views, options.mass), stream)
 
 
 def _views(options: ViewOptions, size: tuple[int, int]) -> tuple[View, ...]:

@@ -22,8 +22,8 @@ FORMATS = {"glb": ".glb", "obj": ".obj", "cityjson": ".city.json"}
     type=click.Choice(["auto", "own", "side-by-side"]),
     default="auto",
     show_default=True,
-    help="Several items in one file: where they stand. auto keeps their own coordinates unless "
-    "two plans overlap.",
+    help="Where items stand: auto puts imported ones back on their map, and others side by side "
+    "if their plans overlap.",
 )
 def command(stream: StreamOptions, form: str | None, arrange: str) -> None:
     """Write buildings, footprints and layouts as GLB, OBJ or CityJSON.

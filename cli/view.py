@@ -49,6 +49,7 @@ def _size(ctx: click.Context, param: click.Parameter, value: str | None) -> tupl
 )  # fmt: skip
 @click.option("--columns", type=click.IntRange(1, 100), help="Pictures side by side in a sheet.")
 @click.option("--sides", is_flag=True, help="Four pictures of each: front, right, back, left.")
+@click.option("--mass", is_flag=True, help="Beside each building its box plan and energy curve.")
 @click.option("--no-labels", is_flag=True, help="Leave the ids out of a sheet.")
 def command(stream: StreamOptions, **values: object) -> None:
     """Draw any artifact: a picture (.png) or a page that turns in a browser (.html).

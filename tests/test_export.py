@@ -43,8 +43,9 @@ def test_one_file_by_its_ending(facade, tmp_path, ending):
     facade("export", "-", "-o", again, stdin=stream(HOUSE))
     one, two = (path.read_bytes().replace(b"again", b"model") for path in (out, again))
     assert one == two
-    left = {path.name for path in tmp_path.iterdir()} - {out.name, again.name}
-    assert left == ({"model.mtl", "again.mtl"} if ending == "obj" else set())
+    left = {path.name for path in tmp_path.iterdir() if path.stem.startswith("model")} - {out.name}
+    pictures = {"model-0.png", "model-1.png"}  # boards and shingles
+    assert left == ({"model.mtl"} | pictures if ending == "obj" else set())
 
 
 def test_glb_has_the_closed_mass_and_names_that_carry_meaning(facade, tmp_path):
@@ -94,6 +95,36 @@ def test_a_map_keeps_its_coordinates(facade, tmp_path):
     assert facade("export", "-", "-o", out, stdin=stream(FOOTPRINT, far)).returncode == 0
     extent = json.loads(out.read_bytes())["metadata"]["geographicalExtent"]
     assert (extent[0], extent[3]) == (0.0, 59.0)
+
+
+def framed(identity, x, rotation=0.0):
+    frame = {"rotation": rotation, "shift": [500000.0 + x, 5600000.0, 40.0], "crs": "EPSG:25832"}
+    return {**FOOTPRINT, "id": identity, "frame": frame}
+
+
+def test_imported_items_go_back_to_their_map(facade, tmp_path):
+    items = stream(framed("a", 0.25), framed("b", 30.0, 90.0))
+    out = tmp_path / "town.city.json"
+    assert facade("export", "-", "-o", out, stdin=items).returncode == 0
+    city = json.loads(out.read_bytes())
+    assert city["metadata"]["referenceSystem"].endswith("/EPSG/0/25832")
+    low_x, low_y, low_z, high_x, high_y, _ = city["metadata"]["geographicalExtent"]
+    assert (low_x, low_z) == (500000.25, 40.0)
+    assert (high_x, low_y, high_y) == (500030.0, 5600000.0, 5600009.0)  # b, turned, is 6 wide
+    glb = tmp_path / "town.glb"
+    assert facade("export", "-", "-o", glb, stdin=items).returncode == 0
+    geometry = trimesh.load(glb).geometry
+    assert geometry["a/mass"].bounds[0].tolist() == [0.25, 0.0, -6.0]
+    assert geometry["b/mass"].bounds[0] == pytest.approx([24.0, 0.0, -9.0])
+
+
+def test_a_single_model_stays_local_but_its_cityjson_knows_the_map(facade, tmp_path):
+    for end in ("glb", "city.json"):
+        done = facade("export", "-", "-o", tmp_path / f"x.{end}", stdin=stream(framed("a", 5.0)))
+        assert done.returncode == 0
+    assert trimesh.load(tmp_path / "x.glb").geometry["mass"].bounds[0][0] == 0.0
+    city = json.loads((tmp_path / "x.city.json").read_bytes())
+    assert city["metadata"]["geographicalExtent"][0] == 500005.0
 
 
 def test_standard_output_takes_a_single_file(facade):

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypeVar
 
+import numpy as np
+
+from ..artifacts.building import Frame
 from ..geometry.arrays import Floats
 from ..geometry.mesh import Scene
 from ..geometry.scenes import bounds, moved, shifts
@@ -33,19 +37,57 @@ def model_files(
     return {f"{stem}{ENDINGS[form]}": gltf.write(scenes, stem)}
 
 
-def placed(parts: Sequence[Part], arrange: str) -> list[Part]:
-    """Return the parts where they shall stand: `own`, `side-by-side`, or `auto` (see shifts)."""
+def placed(parts: Sequence[Part], arrange: str, frames: Sequence[Frame | None] = ()) -> list[Part]:
+    """Return the parts where they shall stand in one file.
+
+    arrange: `own` leaves them; `auto` puts them back on the map where each has a frame (see
+    `mapped`), else shifts them apart if any two overlap; `side-by-side` always does.
+    """
     if arrange == "own":
         return list(parts)
+    known = [frame for frame in frames if frame is not None]
+    if arrange == "auto" and len(known) == len(parts) and _is_map(known):
+        return mapped(parts, known)
     steps = shifts([_bounds(part) for part in parts], always=arrange != "auto")
-    return [_moved(part, step) for part, step in zip(parts, steps, strict=True)]
+    return [_moved(part, np.eye(3), step) for part, step in zip(parts, steps, strict=True)]
+
+
+def _is_map(frames: Sequence[Frame]) -> bool:
+    return len({frame.crs for frame in frames}) == 1 and len({f.shift for f in frames}) == len(
+        frames
+    )
+
+
+def mapped(parts: Sequence[Part], frames: Sequence[Frame]) -> list[Part]:
+    """Return the parts turned and shifted from their local frames to the map that they came from.
+
+    CityModels get the map's own coordinates and reference system. Scenes, which end in 32-bit
+    floats, stand relative to the first one's place, and a single one stays as it is.
+    """
+    out: list[Part] = []
+    origin = np.floor(frames[0].shift)
+    for part, frame in zip(parts, frames, strict=True):
+        if isinstance(part, CityModel):
+            moved_part = _moved(part, _turn(frame.rotation), np.array(frame.shift))
+            out.append(replace(moved_part, crs=frame.crs))
+        elif len(parts) > 1:
+            out.append(_moved(part, _turn(frame.rotation), np.array(frame.shift) - origin))
+        else:
+            out.append(part)
+    return out
+
+
+def _turn(degrees: float) -> Floats:
+    angle = math.radians(degrees)
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def _bounds(part: Scene | CityModel) -> Floats:
     return bounds(part) if isinstance(part, Scene) else part.bounds()
 
 
-def _moved(part: Part, step: Floats) -> Part:
+def _moved(part: Part, turn: Floats, step: Floats) -> Part:
     if isinstance(part, Scene):
-        return moved(part, step.tolist())
-    return replace(part, vertices=part.vertices + step)
+        return moved(part, turn, step)
+    return replace(part, vertices=part.vertices @ turn.T + step)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import groupby
 
 import numpy as np
 
 from ..geometry.mesh import Material, Mesh, Scene
-from .gltf import covered, mime_type
+from .gltf import mime_type
+from .tiles import tile
 
 NOTE = "facade-tools artifact:"  # before the JSON of an artifact, in a comment
 
@@ -30,7 +32,7 @@ def write(scenes: Sequence[Scene], stem: str) -> dict[str, bytes]:
         for name, group in groupby(scene.meshes, key=lambda mesh: mesh.name):
             lines.append(f"o {_word(prefix + name)}")
             for mesh in group:
-                material = _named(covered(scene.materials[mesh.material], mesh), materials)
+                material = _named(_covered(scene.materials[mesh.material], mesh), materials)
                 lines.append(f"usemtl {material}")
                 lines.extend(_mesh_lines(mesh, offsets))
     mtl = [
@@ -42,6 +44,18 @@ def write(scenes: Sequence[Scene], stem: str) -> dict[str, bytes]:
     files[f"{stem}.mtl"] = _text(mtl)
     files[f"{stem}.obj"] = _text(lines)
     return files
+
+
+def _covered(material: Material, mesh: Mesh) -> Material:
+    """Return the material with its pattern as a coloured texture where the mesh can carry one.
+
+    Many readers let a texture take the place of the colour, so the texture brings it along.
+    """
+    if not material.pattern or mesh.uv is None:
+        return replace(material, pattern="")
+    picture = tile(material.pattern, material.color)
+    name = f"{material.name}-{material.pattern}"
+    return replace(material, name=name, color="#ffffff", texture=picture, pattern="")
 
 
 def _text(lines: list[str]) -> bytes:

@@ -1,4 +1,4 @@
-"""Seamless textures of the surface patterns, as PNG: grey, to be multiplied with a colour."""
+"""Seamless textures of the surface patterns, as PNG."""
 
 from __future__ import annotations
 
@@ -10,19 +10,21 @@ from ..geometry.arrays import Floats
 from ..geometry.patterns import REPEAT, TILES, period
 from . import png
 
-PIXELS = 160  # a metre
+# Rows and columns: powers of two, which every renderer can repeat.
+PIXELS = {"siding": (128, 16), "shingle": (256, 256), "brick": (128, 256)}
 
 
 @cache
-def tile(pattern: str) -> bytes:
-    """Return the picture that repeats every `period(pattern)` metres."""
+def tile(pattern: str, color: str = "#ffffff") -> bytes:
+    """Return the picture that repeats every `period(pattern)` metres, grey or in a colour."""
     width, height = period(pattern)
-    shape = round(height * PIXELS), round(width * PIXELS)
+    shape = PIXELS[pattern]
     x = (np.arange(shape[1]) + 0.5) / shape[1] * width / TILES[pattern][0]
     y = (1.0 - (np.arange(shape[0]) + 0.5) / shape[0]) * height / TILES[pattern][1]
     draw = _boards if pattern == "siding" else _courses
     grey = np.round(255 * np.clip(draw(pattern, x[None, :], y[:, None]), 0.0, 1.0))
-    return png.write(np.repeat(grey.astype(np.uint8)[:, :, None], 3, axis=2))
+    tinted = grey[:, :, None] * (np.frombuffer(bytes.fromhex(color[1:]), np.uint8) / 255.0)
+    return png.write(np.round(tinted).astype(np.uint8))
 
 
 def _boards(_: str, x: Floats, y: Floats) -> Floats:

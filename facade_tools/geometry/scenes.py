@@ -22,10 +22,9 @@ def bounds(scene: Scene) -> Floats:
     return np.array([low, np.max([p.max(axis=0) for p in points], axis=0)])
 
 
-def moved(scene: Scene, shift: Sequence[float]) -> Scene:
-    """Return the scene shifted by (x, y, z) metres."""
-    step = np.asarray(shift, dtype=np.float64)
-    meshes = tuple(replace(mesh, vertices=mesh.vertices + step) for mesh in scene.meshes)
+def moved(scene: Scene, turn: Floats, step: Floats) -> Scene:
+    """Return the scene turned by a rotation matrix (3, 3), then shifted by (x, y, z) metres."""
+    meshes = tuple(replace(mesh, vertices=mesh.vertices @ turn.T + step) for mesh in scene.meshes)
     return replace(scene, meshes=meshes)
 
 

@@ -25,6 +25,7 @@ from facade_tools.exteriors.mass_roofs import roof_height
 from facade_tools.exteriors.massgen import generate_mass
 from facade_tools.geometry.boxes import box_rectangles, shared_outline
 from facade_tools.geometry.floors import floor_rectangles
+from facade_tools.imaging.mass_views import mass_pictures
 from facade_tools.randomness import item_generator
 
 
@@ -258,3 +259,18 @@ def test_command_makes_buildings(facade, tmp_path):
     assert buildings[0]["provenance"]["options"] == {"candidates": 2, "require": None}
     again = facade("massgen", "-", "--candidates", "2", "--jobs", "2", stdin=stdin)
     assert again.stdout == result.stdout
+
+
+def test_view_shows_plan_and_energy_curve(facade, tmp_path):
+    (building,) = made(targets("garage"))
+    curve = building.tags["mass_energy_curve"]
+    energies = [energy for _, energy in curve]
+    assert energies == sorted(energies, reverse=True)
+    path = tmp_path / "house.json"
+    path.write_text(json.dumps(encode(building)))
+    result = facade("view", path, "--mass", "--size", "200x150", "-o", tmp_path / "mass.png")
+    assert result.returncode == 0, result.stderr
+    plan, drawn = mass_pictures(building, (200, 150))
+    assert plan.shape == drawn.shape == (150, 200, 3)
+    assert (plan[75, 100] != plan[0, 0]).any()
+    assert mass_pictures(replace(building, tags={}), (200, 150))[1].shape == (150, 200, 3)

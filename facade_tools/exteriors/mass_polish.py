@@ -13,7 +13,7 @@ import numpy as np
 from ..compiled import compiled
 from ..geometry.arrays import Floats, Integers, Rectangles
 from ..geometry.floors import TOLERANCE
-from .mass_attributes import MASS_SIZE, PORCH
+from .mass_attributes import GENERAL, MASS_SIZE, PORCH
 from .mass_energy import DISCONNECTED, Target
 from .mass_layout import (
     CAPACITY,
@@ -112,7 +112,7 @@ def _in_zone(row: Floats, zones: Rectangles) -> bool:
 
 @compiled
 def valid(layout: Layout, target: Target) -> bool:
-    """Tell whether all boxes are thick and high enough, and out of the target's zones."""
+    """Tell whether all boxes are thick, high and out of the target's zones, one a general one."""
     for k in range(CAPACITY):
         if layout.kinds[k] == EMPTY:
             continue
@@ -125,7 +125,7 @@ def valid(layout: Layout, target: Target) -> bool:
             return False
         if height < low and layout.locks[k] & HEIGHT_LOCKED == 0:
             return False
-    return True
+    return bool((layout.kinds == GENERAL).any())
 
 
 @compiled

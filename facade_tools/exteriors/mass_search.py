@@ -20,17 +20,24 @@ BOX_PRICE = 0.003  # of energy: prefers the simpler of equal starts
 EXACT = 1e-8  # energies below it are equally good
 THRESHOLD = 1e-3  # of FW16: below it the attributes count as met
 DECADE, MISSED = 1.2, 8.0
+HISTORY = 64
 NEAT = 5.0  # of the rank: good enough to stop
 
 
 class Pool(NamedTuple):
-    """The best layouts so far: boxes (n, CAPACITY, 5), kinds, locks, energies, clumsiness."""
+    """The best layouts so far: boxes (n, CAPACITY, 5), kinds, locks, energies, clumsiness.
+
+    history: (HISTORY, 2) how many layouts had been polished when the least energy fell, and to
+    what; counts: layouts polished, rows of the history.
+    """
 
     rows: Floats
     kinds: Integers
     locks: Integers
     energies: Floats
     taste: Floats
+    history: Floats
+    counts: Integers
 
 
 def new_pool(size: int) -> Pool:
@@ -42,7 +49,18 @@ def new_pool(size: int) -> Pool:
         np.zeros(shape, dtype=np.int64),
         np.full(size, np.inf),
         np.full(size, np.inf),
+        np.zeros((HISTORY, 2)),
+        np.zeros(2, dtype=np.int64),
     )
+
+
+@compiled
+def _record(pool: Pool, energy: float) -> None:
+    pool.counts[0] += 1
+    rows = pool.counts[1]
+    if rows < HISTORY and (rows == 0 or energy < pool.history[rows - 1, 1]):
+        pool.history[rows, 0], pool.history[rows, 1] = pool.counts[0], energy
+        pool.counts[1] += 1
 
 
 @compiled
@@ -92,6 +110,7 @@ def settle(pool: Pool, layout: Layout, target: Target, work: Work) -> float:
     drop_redundant(layout)
     energy = layout_energy(layout, target, work)
     if valid(layout, target):
+        _record(pool, energy)
         offer(pool, layout, energy, clumsiness(layout, target.tower, work))
     return energy
 
@@ -108,6 +127,8 @@ def informed_round(
         np.zeros(size, dtype=np.int64),
         np.full(POLISHED, np.inf),
         np.full(POLISHED, np.inf),
+        pool.history,
+        pool.counts,
     )
     layout = Layout(base.rows.copy(), base.kinds.copy(), base.locks.copy())
     for _ in range(STARTS):

@@ -31,11 +31,15 @@ MET = 0.01  # a group whose relative residual is less counts as met
 
 @dataclass(frozen=True, slots=True)
 class Mass:
-    """Boxes of one mass, their energy, and its shares by attribute group."""
+    """Boxes of one mass, their energy, and its shares by attribute group.
+
+    curve: the search's (layouts polished, least energy) wherever that fell.
+    """
 
     boxes: tuple[Box, ...]
     energy: float
     shares: dict[str, float]
+    curve: tuple[tuple[int, float], ...] = ()
 
 
 def generate_mass(
@@ -86,13 +90,15 @@ def find_masses(
     rounds = 2 if count == 1 else 4 + count
     search(pool, base, target, rng, new_work(), np.array([rounds, RESTARTS]))
     found = []
+    rows = pool.history[: pool.counts[1]].tolist()
+    curve = tuple((int(done), float(f"{energy:.4g}")) for done, energy in rows)
     for k in np.flatnonzero(np.isfinite(pool.energies)).tolist():
         layout = pooled(pool, k)
         if not known:
             move_to_origin(layout)
         round_layout(layout, GRAIN)
         boxes = boxes_of(layout, known)
-        found.append(Mass(boxes, *mass_energy(boxes, target)))
+        found.append(Mass(boxes, *mass_energy(boxes, target), curve))
     return diverse(found, count)
 
 
@@ -157,4 +163,5 @@ def _finished(
         chimneys=chimneys,
         targets=replace(attributes, provenance=None),
         energy=Energy(mass=mass.energy, residuals=relative_residuals(mass.shares, MET)),
+        tags={"mass_energy_curve": mass.curve},
     )

@@ -92,8 +92,12 @@ def bench_held_out() -> None:
 def least_by_exhaustion(mass: Building, wanted: FacadeAttributes) -> float:
     """Least energy over all subsets of symmetric, filled and aligned pieces, side by side.
 
-    The ratio is taken as met; a piece of less than 0.9 m in width or 1 m in height stays empty.
+    The ratio counts only as far as main door and garage door exceed it; a piece of less than 0.9 m
+    in width or 1.9 m in height stays empty. The garage door stands in the middle of its wall, the
+    main door behind its porch: where that does not reach the middle, the wall is not symmetric.
     """
+    off_middle = door_walls_off_middle(mass)
+    garages = {box.id for box in mass.boxes if box.kind == "garage"}
     total = 0.0
     for k, side in enumerate(SIDES):
         pieces = facade_pieces(mass)[side]
@@ -106,8 +110,14 @@ def least_by_exhaustion(mass: Building, wanted: FacadeAttributes) -> float:
             for j, high in enumerate(usable)
             if above(side, low, high)
         ]
+        ratio = must_stand(mass, side) / wall
+        over = term(ratio, wanted.wwr[k]) if ratio > (wanted.wwr[k] or 0.0) else 0.0
+        allowed = [
+            "a" if p.id in off_middle else "s" if side == "front" and p.box in garages else "esa"
+            for p in usable
+        ]
         best = np.inf
-        for states in product("esa", repeat=len(usable)):  # empty, symmetric, asymmetric
+        for states in product(*allowed):  # empty, symmetric, asymmetric
             sym = (
                 1.0 - sum(a for a, state in zip(areas, states, strict=True) if state == "a") / wall
             )
@@ -115,8 +125,27 @@ def least_by_exhaustion(mass: Building, wanted: FacadeAttributes) -> float:
             fractions = [met / filled for met in range(filled + 1)] if filled else [1.0]
             align = min(term(f, wanted.align[k]) for f in fractions)
             best = min(best, term(sym, wanted.sym[k]) + align)
-        total += best
+        total += best + over
     return total
+
+
+def must_stand(mass: Building, side: str) -> float:
+    """Return the area of the doors that a front has to have (m²)."""
+    garages = [b for b in mass.boxes if b.kind == "garage"] if side == "front" else []
+    doors = sum(2.1 * min(2.4, box.width - 0.5) for box in garages)
+    return doors + (2.0 if side == "front" else 0.0)
+
+
+def door_walls_off_middle(mass: Building) -> set[str]:
+    """Return front walls with a porch under which the middle of the wall does not lie."""
+    found = set()
+    for piece in facade_pieces(mass)["front"]:
+        x, y, z = piece.origin
+        for box in mass.boxes:
+            touches = box.kind == "porch" and abs(box.y + box.depth / 2 - y) < 0.05 and z == 0
+            if touches and abs(box.x - x - piece.width / 2) > box.width / 2 - 0.5:
+                found.add(piece.id)
+    return found
 
 
 def term(value: float, target: float | None) -> float:
@@ -213,7 +242,7 @@ def score(truth: Building, guess: Building) -> float:
 
 
 def mirrored_front(truth: Building) -> Building:
-    """Return the baseline: each hidden wall shows the front wall that is most alike, mirrored, scaled."""
+    """Return the baseline: hidden walls show the most similar front wall, mirrored, scaled."""
     facades = {"front": truth.facades["front"]}
     for side in SIDES[1:]:
         pieces = []

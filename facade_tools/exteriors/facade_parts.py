@@ -1,17 +1,15 @@
-"""What a building gets from the library: substyles with weights, doors, garage doors."""
+"""What a building gets from the library: substyles with weights, and the main door."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..artifacts.building import SIDES, Building, Element, ElementKind, Piece, Side
+from ..artifacts.building import Building, ElementKind, Piece
 from ..artifacts.library import Library, LibraryBuilding, Part, PartSide
-from ..geometry.arrays import Floats
-from ..geometry.blocked import blocked_rectangles, wall_of
-from ..geometry.checks import GARAGE_WALL, element_rectangles, overlaps
+from ..geometry.blocked import wall_of
 
 DOOR = (0.95, 2.1)  # a door where the library has none (m)
 DOOR_WEIGHT = 3.0  # doors beside the main one are few: drawn this much more often than counted
@@ -156,70 +154,3 @@ def _porch_range(building: Building, piece: Piece) -> tuple[float, float] | None
             if low <= high and high > 0 and low < piece.width:
                 return low, high
     return None
-
-
-def garage_doors(
-    building: Building,
-    pieces: Mapping[Side, Sequence[Piece]],
-    library: Library,
-    entry: LibraryBuilding,
-) -> dict[str, tuple[Element, ...]]:
-    """Return by piece id the doors of every garage: in its front wall, or else its widest."""
-    sizes = _garage_sizes(library, entry)
-    doors: dict[str, tuple[Element, ...]] = {}
-    for box in building.boxes:
-        walls = [
-            (
-                side != "front",
-                SIDES.index(side) if side != "front" else 0,
-                -piece.width,
-                side,
-                piece,
-            )
-            for side in SIDES
-            for piece in pieces.get(side, ())
-            if box.kind == "garage" and piece.box == box.id and _takes_garage_door(piece)
-        ]
-        for *_, side, piece in sorted(walls, key=lambda row: (row[0], row[2], row[1])):
-            placed = _garage_elements(piece, sizes, blocked_rectangles(building, side, piece))
-            if placed:
-                doors[piece.id] = placed
-                break
-    return doors
-
-
-def _takes_garage_door(piece: Piece) -> bool:
-    large = piece.width >= GARAGE_WALL[0] - 0.2 and piece.height >= GARAGE_WALL[1] - 0.1
-    return large and piece.origin[2] < 1e-6 and not piece.elements
-
-
-def _garage_sizes(library: Library, entry: LibraryBuilding) -> list[tuple[str, float, float]]:
-    """Return style and size of garage doors: the building's own first, then all of the library."""
-    own = [part.substyle for part in entry.parts]
-    order = [*own, *range(len(library.substyles))]
-    styles = [library.substyles[k] for k in order if library.substyles[k].kind == "garage-door"]
-    rows = [(s.style, s.width, s.height) for s in styles]
-    return list(dict.fromkeys([*rows, ("sectional", 4.8, 2.1), ("sectional", 2.4, 2.1)]))
-
-
-def _garage_elements(
-    piece: Piece, sizes: Iterable[tuple[str, float, float]], blocked: Floats
-) -> tuple[Element, ...]:
-    """Return one wide door or several narrow ones, as wide as fits, evenly spaced."""
-    best: tuple[Element, ...] = ()
-    for style, width, height in sizes:
-        width, tall = min(width, piece.width - 0.5), min(height, piece.height - 0.15)
-        count = max(int((piece.width - 0.4) / (width + 0.3)), 1)
-        gap = (piece.width - count * width) / (count + 1)
-        row = tuple(
-            Element("garage-door", style, round(gap + k * (width + gap), 3), 0.0, width, tall)
-            for k in range(count)
-        )
-        free = not overlaps(element_rectangles(row), blocked).any()
-        if free and (not best or _glass(row) > 1.02 * _glass(best)):
-            best = row
-    return best
-
-
-def _glass(row: Iterable[Element]) -> float:
-    return sum(e.width for e in row)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..artifacts.attributes import WINDOW_BITS, Attributes, FacadeAttributes
-from ..artifacts.building import SIDES, Building, Energy, Facade, Side
+from ..artifacts.building import SIDES, Building, Energy, Facade, Piece, Side
 from ..artifacts.library import LibraryBuilding
 from ..errors import InvalidInput
 from ..geometry.arrays import Floats
@@ -17,8 +17,9 @@ from .attributes import building_attributes
 from .facade_energy import LEAST_TARGET, energy, side_targets, widths
 from .facade_layout import OPEN
 from .facade_layout import Side as SearchSide
-from .facade_parts import Codes, MainDoor, PartRow, garage_doors, main_doors, part_rows, usual_heads
+from .facade_parts import Codes, MainDoor, PartRow, main_doors, part_rows, usual_heads
 from .facade_site import Solution, facade_of, search_side_of, storey_heads, with_door
+from .garage_doors import garage_doors, garage_sizes
 from .genetic import Search, search_side
 from .kept import Standing, standing_sides
 from .library import ElementLibrary, default_library
@@ -28,6 +29,7 @@ SIMILAR = 3  # buildings that may lend their elements, in random order
 TRIES = 3  # walls in which the main door is tried where the first does not do
 ENOUGH = 5e-3  # energy over its lower bound that needs no elements of another library building
 GOOD = 2e-3  # energy of a side over its lower bound that needs no further try
+MAIN_DOOR_AREA = 2.0  # set aside before the garage door is chosen (m²)
 MISSED = 0.05  # relative difference from which an attribute counts as not met
 
 
@@ -121,7 +123,7 @@ class _Attempt:
     def _facades(self, wanted: FacadeAttributes) -> tuple[dict[Side, Facade], float]:
         library = self.shelf.library
         rows, codes = part_rows(library, self.entry), Codes()
-        sides = self._standing()
+        sides = self._standing(wanted)
         heads = storey_heads(self.building, sides, usual_heads(library, self.entry))
         facades: dict[Side, Facade] = {}
         excess = 0.0
@@ -133,12 +135,17 @@ class _Attempt:
             excess += found.energy - found.least
         return facades, excess
 
-    def _standing(self) -> list[Standing]:
+    def _standing(self, wanted: FacadeAttributes) -> list[Standing]:
         """Return the sides with known elements and garage doors."""
         keep, library = self.options.keep, self.shelf.library
-        sides = standing_sides(self.building, facade_pieces(self.building), keep)
+        made = facade_pieces(self.building)
+        sides = standing_sides(self.building, made, keep)
         free = {side.name: side.pieces for side in sides if not side.closed}
-        doors = garage_doors(self.building, free, library, self.entry)
+        room = {
+            name: _area(pieces, ratio) - (name == "front") * MAIN_DOOR_AREA
+            for (name, pieces), ratio in zip(made.items(), wanted.wwr, strict=True)
+        }
+        doors = garage_doors(self.building, free, garage_sizes(library, self.entry), room)
         return [
             replace(
                 side,
@@ -179,6 +186,11 @@ class _Attempt:
                 break
         assert best is not None
         return best, main
+
+
+def _area(pieces: Sequence[Piece], ratio: float | None) -> float:
+    """Return the area of elements (m²) that a target ratio means."""
+    return np.inf if ratio is None else ratio * sum(p.width * p.height for p in pieces)
 
 
 def _energy(done: Building, wanted: FacadeAttributes) -> Energy:

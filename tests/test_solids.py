@@ -42,7 +42,7 @@ def test_building_is_a_volume(name: str) -> None:
 
 def test_random_buildings_are_volumes() -> None:
     rng = np.random.default_rng(0)
-    for _ in range(300):
+    for _ in range(200):
         building = random_building(rng)
         mesh = as_mesh(building_solid(building))
         assert mesh.is_volume, building

@@ -55,7 +55,7 @@ def _skeletal(rings: Rings, eaves: float, roof: Roof) -> list[Patch]:
         return _mansard(contour, skeleton, eaves, roof)
     distances = _distances(contour)
     return [
-        Patch([skeleton.points[face]], _raised(distances[k], slope_of(roof), eaves))
+        Patch(skeleton.polygon(k), _raised(distances[k], slope_of(roof), eaves))
         for k, face in enumerate(skeleton.faces)
         if contour.speeds[k] > 0 and len(face) > 2
     ]
@@ -133,8 +133,9 @@ def truncated(
     along, normal, _ = contour.frames()
     reach = 2.0 * float(np.ptp(skeleton.points, axis=0).sum())
     found = []
-    for k, face in enumerate(skeleton.faces):
-        shape = shapely.Polygon(skeleton.points[face])
+    for k in range(len(skeleton.faces)):
+        outer, *holes = skeleton.polygon(k)
+        shape = shapely.Polygon(outer, holes)
         far, side = reach * normal[k], reach * along[k]
         level = contour.points[k] + time * contour.speeds[k] * normal[k]
         above = shapely.Polygon(

@@ -84,7 +84,9 @@ def skeleton_by(contour: Contour, number: int) -> tuple[Skeleton | None, str]:
     points = nodes[:, :2] @ _rotation(-path.turn) * size + centre
     points[: len(contour.points)] = contour.points
     times = nodes[:, 2] * size
-    skeleton = Skeleton(points, times, rings)
+    count = len(contour.points)
+    faces = tuple(ring for _, ring in rings[:count])
+    skeleton = Skeleton(points, times, faces, tuple(rings[count:]))
     return skeleton, fault(skeleton, contour)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from facade_tools.compiled import compiled
 
-from .arrays import Floats, Integers, Points2
+from .arrays import Booleans, Floats, Integers, Points2
 from .skeleton_shape import Contour, Skeleton
 
 TOLERANCE = 1e-6  # metres, and share of the area
@@ -22,19 +22,28 @@ def fault(skeleton: Skeleton, contour: Contour) -> str:
         return "a node below the eaves"
     if plane_error(skeleton, contour) > TOLERANCE:
         return "a node off the planes of its faces"
-    ends = np.cumsum([len(face) for face in skeleton.faces])
-    flat = np.concatenate(skeleton.faces)
-    upright = contour.speeds == 0
-    areas = _face_areas(skeleton.points, flat, ends)
+    edges, rings = _rings(skeleton)
+    ends = np.cumsum([len(ring) for ring in rings])
+    flat = np.concatenate(rings)
+    areas = _ring_areas(skeleton.points, flat, ends)
+    faces, holes = np.split(areas, [len(skeleton.faces)])
     if abs(areas.sum() - contour.area) > TOLERANCE * contour.area:
         return "faces do not add up to the polygon"
     # A face is empty only where a faster edge in the same line takes its place at once.
     alike = bool(np.all(contour.speeds == contour.speeds[0]))
-    if areas.min() < -TOLERANCE * contour.area or (alike and areas.min() <= 0):
+    if faces.min() < -TOLERANCE * contour.area or (alike and faces.min() <= 0):
         return "a face without area"
-    if _crossing(skeleton.points, flat, ends, upright):
+    if holes.max(initial=0.0) > TOLERANCE * contour.area:
+        return "a face in two parts"
+    if _crossing(skeleton.points, flat, ends, contour.speeds[edges] == 0):
         return "a face that crosses itself"
     return ""
+
+
+def _rings(skeleton: Skeleton) -> tuple[Integers, list[Integers]]:
+    """Return the edge of every ring of the faces, and the rings."""
+    edges = [*range(len(skeleton.faces)), *(edge for edge, _ in skeleton.holes)]
+    return np.array(edges), [*skeleton.faces, *(ring for _, ring in skeleton.holes)]
 
 
 def plane_error(skeleton: Skeleton, contour: Contour) -> float:
@@ -43,14 +52,15 @@ def plane_error(skeleton: Skeleton, contour: Contour) -> float:
     For an edge of speed w: |distance to its line − w · time|.
     """
     _, normal, _ = contour.frames()
-    edge = np.repeat(np.arange(len(skeleton.faces)), [len(face) for face in skeleton.faces])
-    node = np.concatenate(skeleton.faces)
+    edges, rings = _rings(skeleton)
+    edge = np.repeat(edges, [len(ring) for ring in rings])
+    node = np.concatenate(rings)
     distance = np.sum(normal[edge] * (skeleton.points[node] - contour.points[edge]), axis=1)
     return float(np.abs(distance - contour.speeds[edge] * skeleton.times[node]).max(initial=0.0))
 
 
 @compiled
-def _face_areas(points: Points2, flat: Integers, ends: Integers) -> Floats:
+def _ring_areas(points: Points2, flat: Integers, ends: Integers) -> Floats:
     areas = np.zeros(len(ends))
     start = 0
     for f in range(len(ends)):
@@ -75,8 +85,8 @@ def _side(points: Points2, a: int, b: int, c: int) -> float:
 
 
 @compiled
-def _crossing(points: Points2, flat: Integers, ends: Integers, upright: np.ndarray) -> bool:
-    """Whether two edges of one face cross properly."""
+def _crossing(points: Points2, flat: Integers, ends: Integers, upright: Booleans) -> bool:
+    """Whether two edges of one ring cross properly."""
     start = 0
     for f in range(len(ends)):
         end = ends[f]

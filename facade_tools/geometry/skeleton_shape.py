@@ -20,11 +20,18 @@ class Skeleton:
     points: (m, 2) nodes, metres; the first n are the polygon's own points. times: (m,) when the
     wavefront reaches the node: the distance to the edges of speed 1. faces: per edge the ring of
     its face, counter-clockwise, beginning with the edge itself; a face of speed 0 stands upright.
+    holes: (edge, clockwise ring) of the faces that surround another, which needs unequal speeds.
     """
 
     points: Points2
     times: Floats
     faces: tuple[Integers, ...]
+    holes: tuple[tuple[int, Integers], ...] = ()
+
+    def polygon(self, edge: int) -> Rings:
+        """Return the plan rings of one face: the outer one, then holes."""
+        rings = [self.faces[edge], *(ring for k, ring in self.holes if k == edge)]
+        return [self.points[ring] for ring in rings]
 
 
 @dataclass(frozen=True, slots=True)

@@ -71,9 +71,10 @@ def bounds(sizes: tuple[Size, ...], unit: float, length: int) -> Bounds:
     ]
     rows = []
     for size in sizes:
-        used = size.weight > 0 and size.typical is not None and size.spread
-        scale = (size.typical * unit, 1 / (size.spread * unit), size.weight) if used else (0.0,) * 3
-        rows.append(scale)
+        if size.weight > 0 and size.typical is not None and size.spread:
+            rows.append((size.typical * unit, 1 / (size.spread * unit), size.weight))
+        else:
+            rows.append((0.0, 0.0, 0.0))
     return Bounds(
         np.array(least, np.int64),
         np.array(most, np.int64),

@@ -51,13 +51,13 @@ def _planes(picture: Picture) -> Iterator[Plane]:
     yield from _positions(light.shape)
     for plane in (light, lab[1], lab[2], 3 * across, 3 * down):
         yield from _lines(plane)
-    yield from _neighbours(cv2.GaussianBlur(light, (0, 0), 1.5))
-    yield from _neighbours(3 * cv2.blur(across, (5, 5)), STEPS[1:3])
-    yield from _neighbours(3 * cv2.blur(down, (5, 5)), STEPS[1:3])
+    yield from _neighbours(blurred(light, 1.5))
+    yield from _neighbours(3 * boxed(across, (5, 5)), STEPS[1:3])
+    yield from _neighbours(3 * boxed(down, (5, 5)), STEPS[1:3])
 
 
 def _gradients(light: Plane) -> tuple[Plane, Plane]:
-    smooth = cv2.GaussianBlur(light, (0, 0), 0.7)
+    smooth = blurred(light, 0.7)
     across = np.abs(cv2.Sobel(smooth, cv2.CV_32F, 1, 0, scale=0.25))
     down = np.abs(cv2.Sobel(smooth, cv2.CV_32F, 0, 1, scale=0.25))
     return across, down
@@ -68,28 +68,28 @@ def _colours(lab: list[Plane]) -> Iterator[Plane]:
     yield from lab
     for plane, mean, gain in zip(lab, means, (1.0, 4.0, 4.0), strict=True):
         for sigma in BLURS:
-            blurred = cv2.GaussianBlur(plane, (0, 0), sigma)
-            yield 128 + gain * (blurred - np.float32(mean))
+            smooth = blurred(plane, sigma)
+            yield 128 + gain * (smooth - np.float32(mean))
             if gain > 1:
-                yield 128 + 4 * (blurred - 128)
+                yield 128 + 4 * (smooth - 128)
     for sigma in BLURS[1:]:
-        yield 128 + CONTRAST * (lab[0] - cv2.GaussianBlur(lab[0], (0, 0), 2 * sigma))
+        yield 128 + CONTRAST * (lab[0] - blurred(lab[0], 2 * sigma))
 
 
 def _textures(light: Plane, across: Plane, down: Plane) -> Iterator[Plane]:
     yield 4 * across
     yield 4 * down
     for size in TEXTURE_WINDOWS:
-        mean = cv2.blur(light, (size, size))
-        yield 3 * np.sqrt(np.maximum(cv2.blur(light * light, (size, size)) - mean * mean, 0))
-        yield 6 * cv2.blur(across, (size, size))
-        yield 6 * cv2.blur(down, (size, size))
+        mean = boxed(light, (size, size))
+        yield 3 * np.sqrt(np.maximum(boxed(light * light, (size, size)) - mean * mean, 0))
+        yield 6 * boxed(across, (size, size))
+        yield 6 * boxed(down, (size, size))
         yield mean
     for run in RUNS:
         for shape in ((run, 3), (3, run)):
-            yield from (cv2.blur(light, shape), 6 * cv2.blur(across, shape))
-            yield 6 * cv2.blur(down, shape)
-            yield 128 + CONTRAST * (light - cv2.blur(light, shape))
+            yield from (boxed(light, shape), 6 * boxed(across, shape))
+            yield 6 * boxed(down, shape)
+            yield 128 + CONTRAST * (light - boxed(light, shape))
 
 
 def _positions(shape: tuple[int, ...]) -> Iterator[Plane]:
@@ -107,8 +107,8 @@ def _lines(plane: Plane) -> Iterator[Plane]:
         mean = np.broadcast_to(plane.mean(axis, keepdims=True), plane.shape)
         yield mean
         yield 2 * np.broadcast_to(plane.std(axis, keepdims=True), plane.shape)
-        yield 128 + CONTRAST * (cv2.blur(plane, (3, 3)) - mean)
-        near = cv2.GaussianBlur(mean, (0, 0), 6.0)
+        yield 128 + CONTRAST * (boxed(plane, (3, 3)) - mean)
+        near = blurred(mean, 6.0)
         yield 128 + 2 * CONTRAST * (mean - near)
 
 
@@ -116,6 +116,17 @@ def _neighbours(plane: Plane, steps: Sequence[int] = STEPS) -> Iterator[Plane]:
     for step in steps:
         for dx, dy in ((step, 0), (-step, 0), (0, step), (0, -step)):
             yield 128 + CONTRAST * (shifted(plane, dx, dy) - plane)
+
+
+def blurred(plane: Plane, sigma: float) -> Plane:
+    """Return a plane under a Gaussian of `sigma` pixels."""
+    whole = np.ascontiguousarray(plane)  # OpenCV takes no broadcast views
+    return cv2.GaussianBlur(whole, (0, 0), sigma).astype(np.float32, copy=False)
+
+
+def boxed(plane: Plane, size: tuple[int, int]) -> Plane:
+    """Return the means of a plane over boxes of (width, height) pixels."""
+    return cv2.blur(plane, size).astype(np.float32, copy=False)
 
 
 def shifted(plane: Plane, dx: int, dy: int) -> Plane:

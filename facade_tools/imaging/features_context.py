@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .features import Features, Plane, shifted, stacked
+from .features import Features, Plane, blurred, boxed, shifted, stacked
 
 Probabilities = NDArray[np.float32]  # (classes, height, width), sums to 1 over the classes
 
@@ -33,13 +32,13 @@ def context_features(probabilities: Probabilities) -> Features:
 def _planes(one: Plane) -> Iterator[Plane]:
     yield one
     for sigma in BLURS:
-        yield cv2.GaussianBlur(one, (0, 0), sigma)
+        yield blurred(one, sigma)
     for run in RUNS:
-        yield cv2.blur(one, (run, 3))
-        yield cv2.blur(one, (3, run))
+        yield boxed(one, (run, 3))
+        yield boxed(one, (3, run))
     yield from _lines(one)
     yield from _sides(one)
-    smooth = cv2.blur(one, (3, 3))
+    smooth = boxed(one, (3, 3))
     for step in STEPS:
         for dx, dy in ((step, 0), (-step, 0), (0, step), (0, -step)):
             yield shifted(smooth, dx, dy)

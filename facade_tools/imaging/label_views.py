@@ -36,9 +36,8 @@ def overlay(picture: Picture, parse: Parse, strength: float = 0.45) -> Picture:
     thickness = max(1, round(max(out.shape) / 800))
     for region in parse.regions:
         if region.label in ("window", "balcony", "door", "chimney"):
-            color = COLORS[region.label]
-            corners = (region.x0, region.y0), (region.x1 - 1, region.y1 - 1)
-            cv2.rectangle(out, *corners, color, thickness)
+            low, high = (region.x0, region.y0), (region.x1 - 1, region.y1 - 1)
+            cv2.rectangle(out, low, high, COLORS[region.label], thickness)
     return out
 
 

@@ -28,8 +28,10 @@ LEAST_SIDE = 16  # pixels
 
 @dataclass(frozen=True, slots=True)
 class Rectification:
-    """homography: pixels of the photograph to pixels of the rectified picture. confidence: share
-    of line length that agrees with the two directions (1 for corners). size: (width, height).
+    """How a photograph is made straight.
+
+    homography: pixels of the photograph to pixels of the rectified picture. confidence: share of
+    line length that agrees with the two directions (1 for corners). size: (width, height).
     """
 
     homography: Homography
@@ -110,12 +112,14 @@ def _metric(shape: tuple[int, ...], across: Vector, down: Vector) -> Homography:
     inverse = np.linalg.inv(plane)
     inverse /= inverse[2, 2]
     scale = np.sqrt(abs(np.linalg.det(inverse[:2, :2] - np.outer(inverse[:2, 2], inverse[2, :2]))))
-    metric: Homography = np.linalg.inv(middle) @ np.diag([1 / scale, 1 / scale, 1.0]) @ inverse
-    return metric @ middle
+    upright = np.diag([1 / scale, 1 / scale, 1.0]) @ inverse
+    metric: Homography = np.linalg.inv(middle) @ upright @ middle
+    return metric
 
 
 def _unit(vector: Vector) -> Vector:
-    return vector / max(float(np.linalg.norm(vector)), 1e-300)
+    unit: Vector = vector / max(float(np.linalg.norm(vector)), 1e-300)
+    return unit
 
 
 def _focal(one: Vector, other: Vector, longer: int) -> float:
@@ -139,11 +143,11 @@ def _framed(shape: tuple[int, ...], metric: Homography, confidence: float) -> Re
     reach = MOST_GROWTH * np.array([width, height]) / 2
     low = np.maximum(mapped.min(axis=0), middle - reach)
     high = np.minimum(mapped.max(axis=0), middle + reach)
-    size = _size(*(high - low), shape)
+    size = _size(high[0] - low[0], high[1] - low[1], shape)
     shift = np.array([[1, 0, -low[0]], [0, 1, -low[1]], [0, 0, 1.0]])
     return Rectification(shift @ metric, confidence, size)
 
 
 def _size(width: float, height: float, shape: tuple[int, ...]) -> tuple[int, int]:
-    most = MOST_GROWTH * max(shape[:2])
-    return tuple(int(np.clip(round(side), 1, most)) for side in (width, height))  # type: ignore[return-value]
+    most = int(MOST_GROWTH * max(shape[:2]))
+    return min(max(round(width), 1), most), min(max(round(height), 1), most)

@@ -32,12 +32,12 @@ def segments_of(picture: Picture) -> Segments:
         return np.empty((0, 4))
     lines = (found.reshape(-1, 4).astype(np.float64) + 0.5) * scale
     order = np.argsort(-_lengths(lines), kind="stable")
-    return lines[order[:MOST_SEGMENTS]]
+    longest: Segments = lines[order[:MOST_SEGMENTS]]
+    return longest
 
 
 def _lengths(lines: Segments) -> NDArray[np.float64]:
-    lengths: NDArray[np.float64] = np.hypot(lines[:, 2] - lines[:, 0], lines[:, 3] - lines[:, 1])
-    return lengths
+    return np.hypot(lines[:, 2] - lines[:, 0], lines[:, 3] - lines[:, 1]).astype(np.float64)
 
 
 def vanishing_points(lines: Segments, shape: tuple[int, ...]) -> tuple[Vector, Vector, float]:

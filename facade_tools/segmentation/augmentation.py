@@ -26,8 +26,7 @@ def _perspective(shape: tuple[int, ...], rng: np.random.Generator) -> NDArray[np
     target = corners + rng.uniform(-0.02, 0.02, (4, 2)).astype(np.float32) * [width, height]
     if rng.random() < 0.5:
         target[:, 0] = width - target[:, 0]
-    warp: NDArray[np.float64] = cv2.getPerspectiveTransform(corners, target.astype(np.float32))
-    return warp
+    return cv2.getPerspectiveTransform(corners, target.astype(np.float32)).astype(np.float64)
 
 
 def relit(picture: Picture, *, rng: np.random.Generator) -> Picture:

@@ -49,13 +49,12 @@ class Convention:
     indices: NDArray[np.int64]
 
     def read(self, path: str) -> NDArray[np.uint8]:
-        """Return a label map, of indices or of colours, in our labels; what is unknown is refused."""
+        """Return a label map, of indices or colours, in our labels. Raises on unknown classes."""
         picture = read_label_picture(path)
-        if picture.ndim == 3:
-            picture = self._indexed(picture, path)
-        if int(picture.max()) >= len(self.label):
-            raise InvalidInput(f"holds index {int(picture.max())}, which has no class").at(path)
-        mapped: NDArray[np.uint8] = self.label[picture]
+        index = self._indexed(picture, path) if picture.ndim == 3 else picture.astype(np.int64)
+        if int(index.max()) >= len(self.label):
+            raise InvalidInput(f"holds index {int(index.max())}, which has no class").at(path)
+        mapped: NDArray[np.uint8] = self.label[index]
         return mapped
 
     def _indexed(self, picture: NDArray[np.uint8], path: str) -> NDArray[np.int64]:

@@ -48,30 +48,37 @@ class Solution:
 def solve(field: Field, plan: Plan) -> Solution:
     """Return the best of several alternations. Raises Infeasible where no facade fits.
 
-    A grammar whose floors derive each for itself starts from the best with common columns.
+    A grammar whose floors derive each for itself goes on from every start and from its best
+    common columns.
     """
     relaxed = _relaxed(field, plan)
     bound = _solve_rows(field, plan, relaxed[0]).cost
     best: Layout | None = None
     reached = np.inf
     trace: list[float] = []
-    seen: set[tuple[int, ...]] = set()
+    for rows in _starts(field, plan, relaxed):
+        layout, path = _alternate(field, plan, rows)
+        found = [(layout, path[-1])]
+        if plan.per_floor:
+            # the best common columns may hide floors that the picture shows
+            found = [_unfactored(field, plan, cut) for cut in (rows, layout.rows)]
+        for layout, cost in found:
+            trace.append(cost)
+            if cost < reached - GAIN:
+                best, reached = layout, cost
+    assert best is not None
+    return Solution(best, energy(field, plan, best), tuple(trace), bound)
+
+
+def _starts(
+    field: Field, plan: Plan, relaxed: tuple[NDArray[np.float64], NDArray[np.float64]]
+) -> list[Cut]:
+    """Return different rows to start from: columns forgotten, more and less freely."""
+    cuts = {}
     for mix in STARTS:
         rows = _solve_rows(field, plan, (1 - mix) * relaxed[0] + mix * relaxed[1])
-        key = (*rows.states, *rows.bounds)
-        if key in seen:
-            continue
-        seen.add(key)
-        layout, path = _alternate(field, plan, rows)
-        if path[-1] < reached - GAIN:
-            best, reached = layout, path[-1]
-        trace.append(path[-1])
-    assert best is not None
-    if plan.per_floor:
-        best, path = _unfactored(field, plan, best)
-        trace += path
-        reached = path[-1]
-    return Solution(best, energy(field, plan, best), tuple(trace), bound)
+        cuts.setdefault((*rows.states, *rows.bounds), rows)
+    return list(cuts.values())
 
 
 def relaxed_bound(field: Field, plan: Plan) -> float:
@@ -120,15 +127,15 @@ def _alternate(field: Field, plan: Plan, rows: Cut) -> tuple[Layout, list[float]
     columns: dict[int, Cut] = {}
     path: list[float] = []
     for _ in range(MAX_ROUNDS):
-        for group in range(len(plan.groups)):
-            own = [row for row in _segments(rows) if plan.states[row[0]].group == group]
+        for number in range(len(plan.groups)):
+            own = [row for row in _segments(rows) if plan.states[row[0]].group == number]
             every = [
                 (s, 0, field.shape[0])
                 for s, state in enumerate(plan.states)
-                if state.group == group
+                if state.group == number
             ]
-            if own or group not in columns:
-                columns[group] = _solve_columns(field, plan, own or every)
+            if own or number not in columns:
+                columns[number] = _solve_columns(field, plan, own or every)
         groups = [state.group for state in plan.states]
         sets = [None if group is None else columns[group] for group in groups]
         rows = _solve_rows(field, plan, state_costs(field, plan, range(len(groups)), sets))
@@ -178,9 +185,8 @@ def _same_instance(plan: Plan, before: int, after: int) -> bool:
     return plan.states[before].path == own and shared == len(own)
 
 
-def _unfactored(field: Field, plan: Plan, layout: Layout) -> tuple[Layout, list[float]]:
+def _unfactored(field: Field, plan: Plan, rows: Cut) -> tuple[Layout, float]:
     """Give floors their own columns and alternate with the sequence of rows kept."""
-    rows = layout.rows
     owner = owners(plan, rows)
     path: list[float] = []
     limits = row_limits(plan, field, rows.states)
@@ -201,4 +207,4 @@ def _unfactored(field: Field, plan: Plan, layout: Layout) -> tuple[Layout, list[
         path.append(cut.cost + _priors(field, plan, layout))
         if len(path) > 1 and path[-1] > path[-2] - GAIN:
             break
-    return layout, path
+    return layout, path[-1]

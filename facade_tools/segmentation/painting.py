@@ -135,7 +135,7 @@ def _chimney(canvas: Canvas, box: Box, style: Style, rng: np.random.Generator) -
     canvas[box[1] : box[1] + 3, box[0] : box[2]] *= 0.7
     for x in range(box[0] + 2, box[2] - 3, 6):
         top = max(0, box[1] - 4)
-        canvas[top : box[1], x : x + 3] = np.float32([0.6, 0.35, 0.25])
+        canvas[top : box[1], x : x + 3] = np.array([0.6, 0.35, 0.25], np.float32)
 
 
 def _window(canvas: Canvas, box: Box, style: Style, rng: np.random.Generator) -> None:
@@ -143,7 +143,7 @@ def _window(canvas: Canvas, box: Box, style: Style, rng: np.random.Generator) ->
     border = 2 + style.bars % 2
     around = canvas[max(0, y0 - border) : y1 + 1, max(0, x0 - border) : x1 + border]
     around[:] = np.float32(0.5) * around + np.float32(0.5) * style.trim
-    glass = np.float32(rng.uniform(0.05, 0.35)) * np.float32([0.9, 1.0, 1.1])
+    glass = np.array([0.9, 1.0, 1.1], np.float32) * np.float32(rng.uniform(0.05, 0.35))
     part = _fill(canvas, box, glass, 0.03, rng)
     if rng.random() < style.curtains:
         part[:] = np.float32(0.35) * part + np.float32(rng.uniform(0.35, 0.55))
@@ -209,11 +209,8 @@ def _cornices(canvas: Canvas, tree: Node, style: Style, rng: np.random.Generator
     height = canvas.shape[0]
     for node in nodes(tree):
         if node.split == "right" and node.symbol in ("FL", "GF") and rng.random() < 0.6:
-            y = (
-                height
-                - round(node.scope[1 if node.symbol == "FL" else 3])
-                + int(rng.integers(2, 6))
-            )
+            edge = node.scope[1 if node.symbol == "FL" else 3]
+            y = height - round(edge) + int(rng.integers(2, 6))
             if 2 < y < height - 3:
                 canvas[y : y + 2] = (
                     np.float32(0.3) * canvas[y : y + 2] + np.float32(0.7) * style.trim
@@ -241,16 +238,16 @@ def _occlude(picture: Picture, labels: Labels, rng: np.random.Generator) -> None
         centre = (int(rng.integers(width)), height - int(rng.integers(0, 6)))
         axes = (int(rng.integers(15, 40)), int(rng.integers(6, 16)))
         color = rng.integers(10, 220, 3).tolist()
-        for target, value in ((picture, color), (hidden, 1)):
-            cv2.ellipse(target, centre, axes, 0, 0, 360, value, -1)
+        cv2.ellipse(picture, centre, axes, 0, 0, 360, color, -1)
+        cv2.ellipse(hidden, centre, axes, 0, 0, 360, 1, -1)
     if rng.random() < 0.4:
         x, y = int(rng.integers(width)), int(rng.uniform(0.5, 0.9) * height)
-        for target, value in ((picture, (40, 40, 42)), (hidden, 1)):
-            cv2.line(target, (x, y), (x, height), value, 2)
+        cv2.line(picture, (x, y), (x, height), (40, 40, 42), 2)
+        cv2.line(hidden, (x, y), (x, height), 1, 2)
     if rng.random() < 0.2:
         leaf = _noise((height, width), 10, rng)[:, :, 0] + _noise((height, width), 40, rng)[:, :, 0]
-        x = np.arange(width) - rng.uniform(0, width)
-        tree = (leaf > 1.2) & (np.abs(x) < 60)[None] & (np.arange(height) > height / 2)[:, None]
+        near = np.abs(np.arange(width) - rng.uniform(0, width)) < 60
+        tree = (leaf > 1.2) & near[None] & (np.arange(height) > height / 2)[:, None]
         picture[tree] = rng.integers((30, 60, 20), (80, 120, 60))
         hidden[tree] = 1
     labels[hidden > 0] = 0

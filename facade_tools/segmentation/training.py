@@ -124,4 +124,5 @@ def class_weights(labels: NDArray[np.intp], classes: int, balance: float) -> NDA
     """Return weights of pixels: (mean count / count of the class) ** balance."""
     counts = np.bincount(labels, minlength=classes).astype(np.float64)
     weight = (counts.mean() / np.maximum(counts, 1.0)) ** balance
-    return weight[labels].astype(np.float32)
+    chosen: NDArray[np.float32] = weight.astype(np.float32)[labels]
+    return chosen

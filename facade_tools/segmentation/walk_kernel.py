@@ -6,6 +6,8 @@ columns. word[a, i] is the state of part i, size[a, i] its length in pixels befo
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -36,10 +38,10 @@ def cut_of(
     for i in range(count):
         base += least[word[i]]
         running += max(0.0, size[i] - least[word[i]]) * scale
-        out[i + 1] = base + int(round(running))
+        out[i + 1] = base + round(running)
         if out[i + 1] - out[i] > most[word[i]]:
             return False
-    return out[count] == length
+    return bool(out[count] == length)
 
 
 @compiled
@@ -57,8 +59,9 @@ def perturb(
 ) -> int:
     """Perturb one word in place; returns its new number of parts.
 
-    Sizes move by centred Gaussians (eq. 9): all of them, or about two. With probability `change` the word itself does: a
-    part is put in or taken out, or a run between two equal states is doubled or dropped.
+    Sizes move by centred Gaussians (eq. 9): all of them, or about two. With probability `change`
+    the word itself does: a part is put in or taken out, or a run between two equal states is
+    doubled or dropped.
     """  # fmt: skip
     if rng.random() < change:
         kind = rng.random()
@@ -79,7 +82,7 @@ def perturb(
 
 
 @compiled
-def _fits(allowed: Flags, first: Flags, last: Flags, before: int, after: int) -> bool:
+def _fits(allowed: Flags, first: Flags, last: Flags, before: Any, after: Any) -> bool:
     if before < 0:
         return after >= 0 and bool(first[after])
     if after < 0:
@@ -132,7 +135,7 @@ def _put_in(
 
 
 @compiled
-def _pump(word: Ints, size: Reals, count: int, double: bool, rng: np.random.Generator) -> int:
+def _pump(word: Ints, size: Reals, count: int, double: bool, rng: np.random.Generator) -> Any:
     low = rng.integers(0, count)
     high = rng.integers(0, count)
     if low > high:

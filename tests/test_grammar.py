@@ -1,0 +1,223 @@
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from facade_tools.artifacts.documents import decode, encode
+from facade_tools.artifacts.grammar import Grammar, Rule, Size
+from facade_tools.artifacts.store import read_one
+from facade_tools.errors import Infeasible, InvalidInput
+from facade_tools.grammar.derivation import leaves, nodes, painted
+from facade_tools.grammar.expressions import automaton, parse, shape
+from facade_tools.grammar.library import builtin, builtin_names, load
+from facade_tools.grammar.plan import plan
+from facade_tools.grammar.sampling import sample_derivation
+from facade_tools.grammar.segments import Bounds, Moves, best_cut, size_cost
+
+BUILTIN = builtin_names()
+
+
+def accepted(text: str, word: str) -> bool:
+    machine = automaton(parse(text))
+    if not word:
+        return machine.empty
+    states = {s for s in machine.first if machine.symbols[s] == word[0]}
+    for letter in word[1:]:
+        states = {t for s in states for t in machine.follow[s] if machine.symbols[t] == letter}
+    return bool(states & machine.last)
+
+
+@pytest.mark.parametrize(
+    ("text", "pattern"),
+    [
+        ("a (b a)*", "a(ba)*"),
+        ("(a? b c)+", "(a?bc)+"),
+        ("a | b c?", "a|bc?"),
+        ("(a | b)* c", "(a|b)*c"),
+        ("((a? b)* c?)+", "((a?b)*c?)+"),
+    ],
+)
+def test_automata_accept_what_the_expression_says(text, pattern):
+    import re
+
+    for length in range(6):
+        for letters in itertools.product("abc", repeat=length):
+            word = "".join(letters)
+            assert accepted(text, word) == bool(re.fullmatch(pattern, word)), word
+
+
+@pytest.mark.parametrize("text", ["", "(", "a)", "a | ", "*a", "a $ b", "()", "a" * 1001])
+def test_bad_expressions_are_refused(text):
+    with pytest.raises(InvalidInput):
+        parse(text)
+
+
+def test_shapes_of_expressions_forget_names_only():
+    assert shape(parse("Wa (TL Wa)*")) == shape(parse("Rf (TL Rf)*"))
+    assert shape(parse("Wa (TL Wa)*")) != shape(parse("Wa (TL Wa)+"))
+
+
+def random_problem(seed, states=3, length=7):
+    rng = np.random.default_rng(seed)
+    allowed = rng.random((states, states)) < 0.7
+    machine = Moves(allowed, rng.random(states) < 0.8, rng.random(states) < 0.8)
+    least = rng.integers(1, 3, states)
+    most = least + rng.integers(0, 5, states)
+    prior = np.column_stack([rng.uniform(1, 4, states), rng.uniform(0, 1, states), np.ones(states)])
+    return rng.random((states, length)), machine, Bounds(least, most, prior)
+
+
+def brute_force(costs, machine, limits):
+    length = costs.shape[1]
+    best = np.inf
+
+    def extend(at, before, total):
+        nonlocal best
+        if at == length:
+            if machine.last[before]:
+                best = min(best, total)
+            return
+        for state in range(len(costs)):
+            allowed = machine.first[state] if before < 0 else machine.allowed[before, state]
+            for size in range(limits.least[state], limits.most[state] + 1):
+                if allowed and at + size <= length:
+                    cost = costs[state, at : at + size].sum() + size_cost(limits, state, size)
+                    extend(at + size, state, total + cost)
+
+    extend(0, -1, 0.0)
+    return best
+
+
+@pytest.mark.parametrize("seed", range(25))
+def test_the_programme_of_one_axis_equals_brute_force(seed):
+    problem = random_problem(seed)
+    cut = best_cut(*problem)
+    expected = brute_force(*problem)
+    if cut is None:
+        assert expected == np.inf
+    else:
+        assert cut.cost == pytest.approx(expected, abs=1e-6)
+        assert cut.bounds[0] == 0
+        assert cut.bounds[-1] == problem[0].shape[1]
+
+
+@pytest.mark.parametrize("name", BUILTIN)
+def test_shipped_grammars_round_trip_and_compile(name):
+    grammar = builtin(name)
+    assert decode(encode(grammar), "grammar") == grammar
+    made = plan(grammar)
+    assert set(made.labels) <= set(grammar.terminals.values())
+    assert load(name) == grammar
+
+
+@given(st.sampled_from(BUILTIN), st.integers(0, 10**6), st.integers(60, 400))
+@settings(max_examples=40, deadline=None)
+def test_random_derivations_tile_the_canvas(name, seed, width):
+    grammar = builtin(name)
+    tree = sample_derivation(grammar, width, 300.0, rng=np.random.default_rng(seed))
+    area = sum((n.scope[2] - n.scope[0]) * (n.scope[3] - n.scope[1]) for n in leaves(tree))
+    assert area == pytest.approx(width * 300.0)
+    for node in nodes(tree):
+        for child in node.children:
+            assert node.scope[0] - 1e-6 <= child.scope[0] <= child.scope[2] <= node.scope[2] + 1e-6
+            assert node.scope[1] - 1e-6 <= child.scope[1] <= child.scope[3] <= node.scope[3] + 1e-6
+        if node.children:
+            word = [child.symbol for child in node.children]
+            assert derivable(grammar.rules[node.symbol].into, word)
+
+
+def derivable(text, word):
+    machine = automaton(parse(text))
+    states = {s for s in machine.first if machine.symbols[s] == word[0]}
+    for name in word[1:]:
+        states = {t for s in states for t in machine.follow[s] if machine.symbols[t] == name}
+    return bool(states & machine.last)
+
+
+def column_borders(tree, symbol):
+    floors = [n for n in nodes(tree) if n.symbol == symbol]
+    return {tuple(round(c.scope[2], 6) for c in floor.children) for floor in floors}
+
+
+def test_factorised_floors_are_derived_alike_and_others_each():
+    rng = np.random.default_rng(5)
+    alike = sample_derivation(builtin("haussmann"), 200, 300, rng=rng)
+    assert len(column_borders(alike, "FL")) == 1
+    each = sample_derivation(builtin("haussmann-floors"), 200, 300, rng=rng)
+    assert len(column_borders(each, "FL")) > 1
+
+
+def test_painted_trees_hold_every_leaf():
+    grammar = builtin("plain")
+    tree = sample_derivation(grammar, 120, 200, rng=np.random.default_rng(0))
+    index = {"wall": 2, "window": 1, "balcony": 3, "door": 4}
+    assert set(np.unique(painted(tree, (200, 120), index))) <= set(index.values())
+
+
+def toy(**rules):
+    return Grammar("toy", "A", {"a": "wall", "b": "window"}, rules)
+
+
+@pytest.mark.parametrize(
+    ("grammar", "pointer"),
+    [
+        (Grammar("toy", "B", {"a": "wall"}, {"A": Rule("up", "a")}), "/axiom"),
+        (toy(A=Rule("up", "a C")), "/rules/A/into"),
+        (toy(A=Rule("up", "a (")), "/rules/A/into"),
+        (toy(A=Rule("up", "a", sizes={"b": Size()})), "/rules/A/sizes/b"),
+        (toy(A=Rule("up", "a", sizes={"a": Size(min=0.2, max=0.1)})), "/rules/A/sizes/a"),
+        (toy(A=Rule("up", "a", sizes={"a": Size(weight=1.0)})), "/rules/A/sizes/a"),
+        (toy(A=Rule("up", "a", like="Z")), "/rules/A/like"),
+        (toy(A=Rule("up", "A a")), "/rules/A/into"),
+        (toy(A=Rule("up", "B"), B=Rule("right", "C"), C=Rule("right", "a")), "/rules/C/into"),
+        (toy(A=Rule("up", "B"), B=Rule("right", "a*")), "/rules/B/into"),
+        (
+            toy(
+                A=Rule("up", "B"),
+                B=Rule("right", "C D"),
+                C=Rule("up", "a b"),
+                D=Rule("up", "a b?"),
+            ),
+            "/rules/D/into",
+        ),
+    ],
+)
+def test_grammars_that_do_not_fit_are_refused_with_the_place(grammar, pointer):
+    with pytest.raises(InvalidInput) as error:
+        plan(grammar)
+    assert error.value.place.pointer == pointer
+
+
+def test_derivations_that_do_not_end_are_refused():
+    grammar = toy(A=Rule("up", "A a"))
+    with pytest.raises(Infeasible):
+        sample_derivation(grammar, 10, 10, rng=np.random.default_rng(0))
+
+
+def test_sample_grammar_writes_parses_that_validate(facade, tmp_path):
+    out = tmp_path / "facades.jsonl"
+    done = facade("sample-grammar", "tskp10", "-n", 3, "-o", out, "--pictures", tmp_path / "p")
+    assert done.returncode == 0, done.stderr
+    assert len(list((tmp_path / "p").iterdir())) == 3
+    assert facade("validate", out).returncode == 0
+    again = facade("sample-grammar", "tskp10", "-n", 3)
+    assert again.stdout == out.read_bytes()
+
+
+def test_unknown_grammars_are_named(facade):
+    done = facade("sample-grammar", "nowhere.yaml")
+    assert done.returncode == 3
+    assert b"neither a file nor a shipped grammar" in done.stderr
+
+
+def test_the_sample_grammar_file_works(facade, tmp_path):
+    from pathlib import Path
+
+    path = Path(__file__).resolve().parent.parent / "sample_data" / "grammars" / "row-house.yaml"
+    grammar = read_one(str(path), "grammar")
+    assert plan(replace(grammar, title="")).labels

@@ -1,0 +1,132 @@
+from __future__ import annotations
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from facade_tools.errors import InvalidInput
+from facade_tools.grammar.library import builtin
+from facade_tools.imaging.homography import applied, fitted_homography, warped
+from facade_tools.imaging.image_io import decoded
+from facade_tools.imaging.rectify import automatic, from_corners
+from facade_tools.segmentation.painting import render_facade
+
+WIDTH, HEIGHT = 330, 440
+CORNERS = np.array([[0, 0], [WIDTH, 0], [WIDTH, HEIGHT], [0, HEIGHT]], np.float64)
+
+
+@pytest.fixture(scope="module")
+def front():
+    return render_facade(builtin("haussmann"), WIDTH, HEIGHT, rng=np.random.default_rng(3))[1]
+
+
+def photographed(turn, focal=700.0, size=(640, 700)):
+    """The facade's corners in a synthetic camera's picture, and the homography to it."""
+    rotation = cv2.Rodrigues(np.array(turn, np.float64))[0]
+    camera = np.array([[focal, 0, size[0] / 2], [0, focal, size[1] / 2], [0, 0, 1.0]])
+    plane = np.column_stack([CORNERS - [WIDTH / 2, HEIGHT / 2], np.zeros(4)])
+    seen = (plane @ rotation.T + [0, 0, 1.05 * focal]) @ camera.T
+    corners = seen[:, :2] / seen[:, 2:]
+    return corners, fitted_homography(CORNERS, corners)
+
+
+@given(st.lists(st.floats(-0.15, 0.15), min_size=8, max_size=8))
+@settings(max_examples=60, deadline=None)
+def test_homographies_are_recovered(offsets):
+    source = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0.3, 0.6]]) * 100
+    wanted = np.eye(3) + np.array([*offsets, 0.0]).reshape(3, 3) * [
+        [1, 1, 50], [1, 1, 50], [1e-2, 1e-2, 0],
+    ]  # fmt: skip
+    found = fitted_homography(source, applied(wanted, source))
+    np.testing.assert_allclose(found, wanted / wanted[2, 2], atol=1e-6)
+
+
+def test_points_on_a_line_fix_no_homography():
+    line = np.array([[0, 0], [1, 1], [2, 2], [3, 0]], np.float64)
+    with pytest.raises(InvalidInput):
+        fitted_homography(line, CORNERS)
+
+
+def test_warping_moves_pixels_by_their_corners():
+    picture = np.zeros((8, 8, 3), np.uint8)
+    picture[2:4, 2:4] = 255
+    double = warped(picture, np.diag([2.0, 2.0, 1.0]), (16, 16))
+    assert (double[5:7, 5:7] == 255).all()
+    assert double[:3].max() == 0
+    np.testing.assert_array_equal(warped(picture, np.eye(3), (8, 8)), picture)
+
+
+@pytest.mark.parametrize("turn", [(0, 0, 0), (0.1, 0.4, 0.0), (-0.2, -0.3, 0.05), (0.3, 0, 0)])
+def test_corners_give_back_the_true_proportions(turn):
+    corners, _ = photographed(turn)
+    found = from_corners((700, 640, 3), corners)
+    assert found.size[0] / found.size[1] == pytest.approx(WIDTH / HEIGHT, rel=0.05)
+    target = applied(found.homography, corners)
+    width, height = found.size
+    expected = [[0, 0], [width, 0], [width, height], [0, height]]
+    np.testing.assert_allclose(target, expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("turn", [(0.12, 0.35, 0.03), (-0.15, -0.25, -0.04), (0.2, 0.2, 0)])
+def test_lines_alone_make_a_facade_straight(front, turn):
+    corners, homography = photographed(turn)
+    photo = warped(front, homography, (640, 700))
+    found = automatic(photo)
+    assert found.confidence > 0.5
+    straight = applied(found.homography, corners)
+    sides = np.roll(straight, -1, axis=0) - straight
+    angles = np.degrees(np.arctan2(sides[:, 1], sides[:, 0]))
+    np.testing.assert_allclose(angles % 90 - 90 * (angles % 90 > 45), 0, atol=1.0)
+    ratio = np.linalg.norm(sides[0]) / np.linalg.norm(sides[1])
+    assert ratio == pytest.approx(WIDTH / HEIGHT, rel=0.06)
+    assert found.picture(photo).shape[:2] == found.size[::-1]
+
+
+@pytest.mark.parametrize("kind", ["flat", "noise", "dot", "circles"])
+def test_pictures_without_structure_are_refused(kind):
+    rng = np.random.default_rng(0)
+    picture = np.full((300, 300, 3), 128, np.uint8)
+    if kind == "noise":
+        picture = rng.integers(0, 255, picture.shape).astype(np.uint8)
+    if kind == "dot":
+        picture = picture[:1, :1]
+    if kind == "circles":
+        for x, y, r in rng.integers(20, 250, (30, 3)):
+            cv2.circle(picture, (int(x), int(y)), int(r // 4), (0, 0, 0), 2)
+    with pytest.raises(InvalidInput, match="corners"):
+        automatic(picture)
+
+
+@pytest.mark.parametrize(
+    "corners",
+    [
+        [[0, 0], [10, 10], [10, 0], [0, 10]],
+        [[0, 0], [5, 0], [10, 0], [0, 10]],
+        [[0, 0], [0, 10], [10, 10], [10, 0]],
+        [[0, 0], [np.nan, 0], [10, 10], [0, 10]],
+    ],
+)
+def test_corners_that_are_no_quadrilateral_are_refused(corners):
+    with pytest.raises(InvalidInput):
+        from_corners((20, 20, 3), np.array(corners, np.float64))
+
+
+def test_the_command(facade, front, tmp_path):
+    corners, homography = photographed((0.1, 0.3, 0.0))
+    photo = tmp_path / "photo.png"
+    cv2.imwrite(str(photo), warped(front, homography, (640, 700))[:, :, ::-1])
+    text = " ".join(f"{x:.3f},{y:.3f}" for x, y in corners)
+    out, report = tmp_path / "front.png", tmp_path / "report.json"
+    done = facade("rectify", photo, "--corners", text, "-o", out, "--report", report)
+    assert done.returncode == 0, done.stderr
+    told = json.loads(report.read_text())
+    picture = decoded(out.read_bytes(), "front")
+    assert list(picture.shape[1::-1]) == told["size"]
+    near = cv2.resize(front, told["size"]).astype(float) - picture
+    assert np.abs(near).mean() < 12
+    assert facade("rectify", photo, "--corners", "1,2 3,4", "-o", out).returncode == 2
+    assert facade("rectify", tmp_path / "none.png", "-o", out).returncode == 3

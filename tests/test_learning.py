@@ -210,7 +210,7 @@ def test_a_known_model_is_recovered():
 
 
 def test_cheeseman_stutz_equals_enumeration():
-    """Two rows, two styles, one group of two clusters: every completion weighed by its posterior."""
+    """Two styles, one group of two clusters: every completion weighed by its posterior."""
     rng = np.random.default_rng(8)
     layout = table_layout(1, 2)
     readings = as_readings([rng.normal(size=(4, 2))], rng.integers(0, 2, (4, 2)).astype(np.int8))
@@ -289,10 +289,15 @@ def test_faithful_and_restarts_learn(houses):
 
 
 def test_what_nobody_observes_comes_from_the_prior(houses):
+    nothing = ((None,) * 6,) * 2
     rows = [
-        replace(h, facade=replace(h.facade, sym=(None,) * 4), mass=replace(h.mass, porch=((None,) * 6,) * 2))
+        replace(
+            h,
+            facade=replace(h.facade, sym=(None,) * 4),
+            mass=replace(h.mass, porch=nothing),
+        )
         for h in houses[:40]
-    ]  # fmt: skip
+    ]
     model = learn_model(rows, rng=np.random.default_rng(0), options=LearnOptions(largest=2))
     assert {"sym.front", "porch_front", "porch_front.px"} <= set(model.unobserved)
     assert "wwr.front" not in model.unobserved

@@ -101,7 +101,7 @@ def clip(scatter: Floats, total: Floats, floor: Floats) -> Floats:
 def fit_table(counts: Floats, strength: float) -> Floats:
     """Return MAP probabilities (rows) under a Dirichlet of `strength` pseudo-counts a row."""
     full = counts + strength / counts.shape[-1]
-    return full / full.sum(axis=-1, keepdims=True)
+    return np.asarray(full / full.sum(axis=-1, keepdims=True))
 
 
 def statistics(

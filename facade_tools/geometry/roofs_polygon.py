@@ -62,11 +62,15 @@ def _skeletal(rings: Rings, eaves: float, roof: Roof) -> list[Patch]:
 
 
 def _shed(rings: Rings, eaves: float, roof: Roof) -> Patch:
+    """Return one plane that rises along the walls nearest to the roof's axis."""
+    edges = np.roll(rings[0], -1, axis=0) - rings[0]
+    longest = edges[int(np.argmax(np.round(np.hypot(*edges.T), 3)))]
+    u, v = longest / np.hypot(*longest)
     axis = 0 if roof.direction == "x" else 1
-    low = float(rings[0][:, axis].min())
-    slope = slope_of(roof)
-    plane = (slope, 0.0, eaves - slope * low) if axis == 0 else (0.0, slope, eaves - slope * low)
-    return Patch(rings, plane)
+    a, b = max([(u, v), (-v, u), (-u, -v), (v, -u)], key=lambda way: float(way[axis]))
+    plane = slope_of(roof) * np.array([a, b])
+    low = float((rings[0] @ plane).min())
+    return Patch(rings, (float(plane[0]), float(plane[1]), eaves - low))
 
 
 def _distances(contour: Contour) -> list[Plane]:

@@ -62,10 +62,13 @@ def generate_facades(
     """
     _refuse_unfinished(building)
     shelf = options.library or default_library()
+    among = max(SIMILAR, options.candidates)
     for number, own in enumerate(rng.spawn(options.candidates), start=1):
         identity = building.id if options.candidates == 1 else f"{building.id}-{number}"
-        similar = shelf.nearest(_known(building), SIMILAR, own)
+        similar = shelf.nearest(_known(building, options.keep), among, own)
         wanted = _wanted(building, similar[0])
+        if options.keep is not None:
+            similar = [shelf.observed(entry, options.keep) for entry in similar]
         tries = (_Attempt(building, shelf, entry, options, own) for entry in similar)
         yield replace(_first_good(attempt.finished(wanted) for attempt in tries), id=identity)
 
@@ -90,13 +93,20 @@ def _refuse_unfinished(building: Building) -> None:
         raise InvalidInput("no general or garage box; expected at least one", pointer="/boxes")
 
 
-def _known(building: Building) -> Attributes:
-    """Return what is known for choosing the library's building: targets, else the mass."""
+def _known(building: Building, keep: Building | None) -> Attributes:
+    """Return what is known for choosing the library's building.
+
+    The mass; its targets' bits, or else its own and those of the windows that were observed; the
+    facade attributes of observed sides.
+    """
     bare = building_attributes(replace(building, facades={}))
+    if keep is not None:
+        seen = building_attributes(replace(keep, partial=True))
+        bare = replace(bare, facade=seen.facade)
     if building.targets is not None:
         return replace(bare, element=building.targets.element)
-    unseen = dict.fromkeys(WINDOW_BITS)
-    return replace(bare, element=replace(bare.element, window=unseen))
+    windows = dict.fromkeys(WINDOW_BITS) if keep is None else seen.element.window
+    return replace(bare, element=replace(bare.element, window=windows))
 
 
 def _wanted(building: Building, entry: LibraryBuilding) -> FacadeAttributes:

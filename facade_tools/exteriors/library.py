@@ -20,10 +20,9 @@ from .attributes import NAMES, attribute_matrix, attribute_vector, building_attr
 
 SUBSTYLES = 5  # sizes a style (FW16 6.2)
 ROUNDS = 50  # of k-means: it stops long before
-_FACADE = ("wwr", "sym", "align")
 _ELEMENT = ("roof", "window", "special")
 _BITS = np.array([name.split(".")[0] in _ELEMENT for name in NAMES])
-_MASS = np.array([name.split(".")[0] not in _ELEMENT + _FACADE for name in NAMES])
+_NUMBERS = ~_BITS
 Style = tuple[str, str]  # kind and style of an element
 END: dict[Side, PartSide] = {"front": "front", "back": "back", "left": "end", "right": "end"}
 
@@ -49,16 +48,16 @@ class ElementLibrary:
         self.scale = np.where(spread > 1e-6, spread, 1.0)
 
     def distances(self, wanted: Attributes) -> Floats:
-        """Return how unlike each building is to `wanted`: element bits first, then the mass.
+        """Return how unlike each building is to `wanted`: element bits first, then the numbers.
 
-        Only numbers known on both sides count; a bit that differs outweighs any mass.
+        Only numbers known on both sides count; a bit that differs outweighs all of them.
         """
         row = attribute_vector(wanted)
         difference = np.abs(self.matrix - row)
         bits = np.nansum(difference[:, _BITS], axis=1)
-        mass = np.clip(difference[:, _MASS] / self.scale[_MASS], 0.0, 3.0)
-        known = np.maximum((~np.isnan(mass)).sum(axis=1), 1)
-        return np.asarray(bits + np.nansum(mass, axis=1) / known / 3.001)
+        rest = np.clip(difference[:, _NUMBERS] / self.scale[_NUMBERS], 0.0, 3.0)
+        known = np.maximum((~np.isnan(rest)).sum(axis=1), 1)
+        return np.asarray(bits + np.nansum(rest, axis=1) / known / 3.001)
 
     def nearest(
         self, wanted: Attributes, among: int, rng: np.random.Generator
@@ -68,6 +67,23 @@ class ElementLibrary:
         order = np.argsort(distances, kind="stable")[:among]
         near = order[np.floor(distances[order]) == np.floor(distances[order[0]])]
         return [self.library.buildings[int(k)] for k in rng.permutation(near)]
+
+    def observed(self, entry: LibraryBuilding, partial: Building) -> LibraryBuilding:
+        """Return a library building whose windows are, in style and size, those of `partial`.
+
+        Its doors stay, and all of its parts where nothing was observed.
+        """
+        styles = {(s.kind, s.style) for s in self.library.substyles}
+        seen = [
+            item
+            for item in _seen(partial)
+            if item.element.kind == "window" and ("window", item.element.style) in styles
+        ]
+        if not seen:
+            return entry
+        substyles = self.library.substyles
+        doors = tuple(p for p in entry.parts if substyles[p.substyle].kind != "window")
+        return replace(entry, parts=_parts(seen, substyles) + doors)
 
 
 @cache
@@ -126,16 +142,19 @@ def storey_of(piece: Piece, storey_height: float) -> int:
 
 
 def _entry(building: Building, seen: list[Seen], substyles: Sequence[Substyle]) -> LibraryBuilding:
+    attributes = replace(building_attributes(building), provenance=None)
+    return LibraryBuilding(building.id, attributes, _parts(seen, substyles), building.colors)
+
+
+def _parts(seen: Iterable[Seen], substyles: Sequence[Substyle]) -> tuple[Part, ...]:
     groups: dict[tuple[int, PartSide, Level], list[Seen]] = {}
     for item in seen:
         key = closest(item.element, substyles), item.side, item.level
         groups.setdefault(key, []).append(item)
-    parts = tuple(
+    return tuple(
         Part(index, side, level, len(items), *_averages(items))
         for (index, side, level), items in sorted(groups.items())
     )
-    attributes = replace(building_attributes(building), provenance=None)
-    return LibraryBuilding(building.id, attributes, parts, building.colors)
 
 
 def _averages(items: list[Seen]) -> tuple[float, float, float]:

@@ -15,6 +15,7 @@ DRAWINGS = {
     "footprint": "facade_tools.geometry.details:footprint_scene",
     "layout": "facade_tools.layering.drawing:layout_picture",
     "attributes": "facade_tools.imaging.attribute_glyphs:attribute_glyph",
+    "parse": "facade_tools.imaging.label_views:parse_view",
 }
 
 MOST_PIXELS = 16_000_000

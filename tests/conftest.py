@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import logging
 import os
 import subprocess
 import sys
@@ -43,5 +45,25 @@ def facade(facade_script):
     def run(*arguments: object, stdin: bytes = b"", cwd: Path | None = None):
         words = [facade_script, *map(str, arguments)]
         return subprocess.run(words, input=stdin, capture_output=True, cwd=cwd, timeout=300)
+
+    return run
+
+
+@pytest.fixture
+def facade_here(capfdbinary, monkeypatch):
+    """Run `facade` in this process, which is faster; results are as those of `facade`."""
+    from facade_tools.cli.main import main
+
+    def run(*arguments: object, stdin: bytes = b"", cwd: Path | None = None):
+        logger = logging.getLogger("facade_tools")
+        before = logger.handlers, logger.level, logger.propagate
+        with monkeypatch.context() as patch:
+            patch.setattr(sys, "stdin", io.TextIOWrapper(io.BufferedReader(io.BytesIO(stdin))))
+            if cwd is not None:
+                patch.chdir(cwd)
+            code = main([str(argument) for argument in arguments])
+        logger.handlers, logger.level, logger.propagate = before
+        out, err = capfdbinary.readouterr()
+        return subprocess.CompletedProcess(arguments, code, out, err)
 
     return run

@@ -193,7 +193,7 @@ def decoded(path):
     return picture
 
 
-def test_one_picture_a_sheet_and_four_sides(facade, tmp_path):
+def test_one_picture_a_sheet_and_four_sides(facade_here, tmp_path):
     options = ("--size", "80x60")
     for name, items, extra, columns in (
         ("one", [HOUSE], [], None),
@@ -201,7 +201,7 @@ def test_one_picture_a_sheet_and_four_sides(facade, tmp_path):
         ("sides", [HOUSE], ["--sides"], 4),
     ):
         out = tmp_path / f"{name}.png"
-        done = facade("view", "-", "-o", out, *options, *extra, stdin=stream(*items))
+        done = facade_here("view", "-", "-o", out, *options, *extra, stdin=stream(*items))
         assert done.returncode == 0, done.stderr
         picture = decoded(out)
         assert picture.std() > 10
@@ -209,9 +209,9 @@ def test_one_picture_a_sheet_and_four_sides(facade, tmp_path):
     assert decoded(tmp_path / "one.png").shape == (60, 80, 3)
 
 
-def test_a_mesh_file_is_drawn(facade, tmp_path):
-    facade("export", "-", "-o", tmp_path / "m.glb", stdin=stream(HOUSE))
-    done = facade("view", tmp_path / "m.glb", "-o", tmp_path / "m.png", "--size", "80x60")
+def test_a_mesh_file_is_drawn(facade_here, tmp_path):
+    facade_here("export", "-", "-o", tmp_path / "m.glb", stdin=stream(HOUSE))
+    done = facade_here("view", tmp_path / "m.glb", "-o", tmp_path / "m.png", "--size", "80x60")
     assert done.returncode == 0, done.stderr
     assert decoded(tmp_path / "m.png").std() > 10
 
@@ -225,8 +225,8 @@ def test_a_mesh_file_is_drawn(facade, tmp_path):
         (["-o", "x.png", "--size", "9999x9999"], 2),
     ],
 )
-def test_wrong_usage(facade, tmp_path, arguments, code):
-    done = facade("view", "-", *arguments, stdin=stream(HOUSE), cwd=tmp_path)
+def test_wrong_usage(facade_here, tmp_path, arguments, code):
+    done = facade_here("view", "-", *arguments, stdin=stream(HOUSE), cwd=tmp_path)
     assert done.returncode == code
     assert not list(tmp_path.iterdir())
 
@@ -266,9 +266,9 @@ def chromium():
     return found
 
 
-def test_page_turns_in_a_browser_without_errors(facade, chromium, tmp_path):
+def test_page_turns_in_a_browser_without_errors(facade_here, chromium, tmp_path):
     out = tmp_path / "page.html"
-    assert facade("view", "-", "-o", out, stdin=stream(HOUSE, ATTRIBUTES)).returncode == 0
+    assert facade_here("view", "-", "-o", out, stdin=stream(HOUSE, ATTRIBUTES)).returncode == 0
     # The page reports its own errors and what its canvas holds, for the dump of its document.
     watch = """<script>
       window.onerror = (message) => { document.documentElement.dataset.error = message; };

@@ -76,7 +76,9 @@ def shade(owner: Integers, inverse: Floats, soup: Soup, eye: Eye, sun: Sun, air:
             if fade < 1.0:
                 _facing(owner[j, i], point, soup, eye, normal)
                 _base(owner[j, i], point, soup, air, color)
-                open_share = _open(i, j, point, normal, depths, eye, air.ball)
+                open_share = 1.0
+                if not bare or fade == 0.0:  # ground away from the scene has nothing over it
+                    open_share = _open(i, j, point, normal, depths, eye, air.ball)
                 _lit(point, normal, open_share, sun, air, color)
                 if not bare and soup.gloss[soup.looks[owner[j, i]]] > 0.0:
                     _mirror(point, normal, eye, air, color)

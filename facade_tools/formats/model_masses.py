@@ -21,6 +21,7 @@ LEFT_OVER = 1.0  # m²: footprint without a roof above it that is worth a place
 SAME_EAVES = 0.2  # metres: eaves nearer than this are level
 LOWEST = 1.6  # metres: lower masses are terraces and ramps
 CHIMNEY_SIDE = (0.2, 2.5)  # metres: least and largest width of a chimney
+CHIMNEY_AREA = 1.6  # m²: a larger one is a dormer
 CHIMNEY_RISE = 0.2  # metres above the highest roof around it
 
 
@@ -179,6 +180,8 @@ def _chimney(
     width, depth = float(high[0] - low[0]), float(high[1] - low[1])
     x, y = (float(value) for value in (low + high)[:2] / 2.0)
     if not CHIMNEY_SIDE[0] <= min(width, depth) <= max(width, depth) <= CHIMNEY_SIDE[1]:
+        return None
+    if width * depth > CHIMNEY_AREA:
         return None
     corners = [(a, b) for a in (low[0], high[0]) for b in (low[1], high[1])]
     around = heights_at(planes, np.array([(x, y), *corners]))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import count, pairwise
@@ -12,7 +13,7 @@ import numpy as np
 
 from . import kernels
 from .candidates import Bounds
-from .evaluation import Borders, evaluate, least_error
+from .evaluation import Borders, Line, crossings, evaluate, least_error, substring_line
 from .problem import SLACK, Alignment, Candidate, Direction, Span
 from .rows import Integers, RowMaker, Rows
 from .sizing import conflict
@@ -22,6 +23,8 @@ Box = Mapping[str, tuple[float, float]]
 Key = tuple[float, int, int, float, tuple[Any, ...]]
 
 FIRST_LABELS = 2_000
+FIRST_STEPS = 300_000
+GROWTH = 8
 MOST_LABELS = 500_000
 MOST_STEPS = 60_000_000
 MOST_NODES = 4000
@@ -63,11 +66,12 @@ class _Node:
     box: Box
     forbidden: tuple[tuple[int, ...], ...]  # of every group
     parent: Borders = ()  # the path that it was branched from
+    leaf: bool = False  # a range of one unsized size in which every Ω is linear
 
     @property
     def signature(self) -> tuple[Any, ...]:
         """Return what two nodes with the same alignments share."""
-        return tuple(sorted(self.box.items())), tuple(map(frozenset, self.forbidden))
+        return tuple(sorted(self.box.items())), tuple(map(frozenset, self.forbidden)), self.leaf
 
 
 def key_of(alignment: Alignment, canvas: float) -> Key:
@@ -104,10 +108,13 @@ def full_key(alignment: Alignment, canvas: float) -> Key:
 class Aligner:
     """Aligns candidates of one direction."""
 
-    def __init__(self, direction: Direction, late: Callable[[], bool] = lambda: False) -> None:
-        """Align until `late` says that the time is up."""
+    def __init__(
+        self, direction: Direction, late: Callable[[float], bool] = lambda _: False
+    ) -> None:
+        """Align; `late(s)` tells whether the time will be up in s seconds."""
         self.direction, self.late = direction, late
         self.maker = RowMaker(direction)
+        self._known: dict[tuple[tuple[Word, ...], str], list[float]] = {}
 
     def best(self, task: Task) -> Found:
         """Return the best alignment of a candidate within its budget of Ω."""
@@ -120,7 +127,7 @@ class Aligner:
         for _ in range(task.effort.nodes):
             if not queue:
                 return Found(None, complete, task.budget)
-            if self.late():
+            if self.late(0.0):
                 break
             _, _, path, node = heapq.heappop(queue)
             if node is None:
@@ -134,6 +141,20 @@ class Aligner:
                     seen.add(child.signature)
                     complete &= self._push(queue, order, child, task)
         return self._cut(queue)
+
+    def _leaf_key(self, task: Task, node: _Node, key: Key) -> Key:
+        """Return a lower bound for the sizes inside a range at whose ends the search was exact.
+
+        There Ω falls towards the greater end, where only the limit of Σ rules alignments out: the
+        search at that end, with the limit eased by all that the range can add to Σ.
+        """
+        ((name, (low, high)),) = node.box.items()
+        times = sum(a.symbol == name for word in task.candidate.words for a in word)
+        ease = times * (high - low) / self.direction.canvas
+        end = replace(node, box={name: (high, high)})
+        path, _ = self.search(task, end, ease)
+        most = (float("inf"), *key[1:])
+        return most if path is None else (key_of(path, self.direction.canvas)[0], *key[1:])
 
     def _cut(self, queue: list[tuple[Key, int, Alignment, _Node | None]]) -> Found:
         """Return the best of what is known when a search is cut short."""
@@ -151,35 +172,42 @@ class Aligner:
         path, complete = self.search(task, node)
         if path is not None:
             key = full_key(path, self.direction.canvas)
+            if node.leaf:
+                key = max(key, self._leaf_key(task, node, key))
             heapq.heappush(queue, (key, next(order), path, node))
         return complete
 
-    def search(self, task: Task, node: _Node) -> tuple[Alignment | None, bool]:
+    def search(self, task: Task, node: _Node, ease: float = 0.0) -> tuple[Alignment | None, bool]:
         """Return the path of least lower bound, and whether the search was complete."""
         complete = True
         lines: list[Borders] = []
         for part, (first, end) in enumerate(task.candidate.split()):
-            borders, whole = self._group(task.candidate.words[first:end], task, node, part)
+            borders, whole = self._group(task.candidate.words[first:end], task, node, part, ease)
             complete = complete and whole
             if borders is None:
                 return None, complete
             lines.append(borders)
         joined = _joined(lines)
         path = evaluate(self.direction, task.candidate, joined, task.tolerance, node.box)
+        if len(lines) == 1 and node.box:
+            floor = self.direction.canvas * (1.0 - task.tolerance - SLACK)
+            path = replace(path, omega=path.omega + max(0.0, floor - path.sigma))
         hopeful = path.omega <= task.budget + SLACK * self.direction.canvas
         return (path if hopeful else None), complete
 
     def _group(
-        self, words: tuple[Word, ...], task: Task, node: _Node, part: int
+        self, words: tuple[Word, ...], task: Task, node: _Node, part: int, ease: float
     ) -> tuple[Borders | None, bool]:
         merged = self.maker.rows(words, node.box, True)
         twins = len(merged.words) < len(words)
-        limits = self._limits(task, twins and not task.splits)
+        limits = self._limits(task, twins and not task.splits, ease, bool(node.box))
         borders, complete = self._run(merged, task, limits, node.forbidden[part])
         if borders is None or not twins or self._covered(words, borders):
             return borders, complete
         rows = self.maker.rows(words, node.box, False)
-        return self._run(rows, task, self._limits(task, False), node.forbidden[part])
+        return self._run(
+            rows, task, self._limits(task, False, ease, bool(node.box)), node.forbidden[part]
+        )
 
     def _covered(self, words: tuple[Word, ...], borders: Borders) -> bool:
         """Tell whether every column has a substring that is opaque throughout."""
@@ -192,16 +220,21 @@ class Aligner:
             for start, end in pairwise(borders)
         )
 
-    def _limits(self, task: Task, loose: bool) -> Integers:
+    def _limits(self, task: Task, loose: bool, ease: float, free: bool) -> Integers:
         scale, canvas = self.maker.scale, self.direction.canvas
         slack = SLACK * canvas
-        widest = canvas * (1.0 + task.tolerance) + slack
+        widest = canvas * (1.0 + task.tolerance + ease) + slack
         budget = min(task.budget, task.tolerance * canvas) + slack
         effort = task.effort
+        floor = (
+            canvas * (1.0 - task.tolerance) - slack
+            if free and len(task.candidate.parts) < 2
+            else 0.0
+        )
         return np.array(
             [
                 scale.down(budget), scale.down(widest), scale.of(canvas), task.splits,
-                effort.steps, effort.beam, loose,
+                effort.steps, effort.beam, loose, max(0, scale.down(floor)),
             ],
             np.int64,
         )  # fmt: skip
@@ -209,17 +242,21 @@ class Aligner:
     def _run(
         self, rows: Rows, task: Task, limits: Integers, forbidden: tuple[int, ...]
     ) -> tuple[Borders | None, bool]:
-        labels = FIRST_LABELS
+        labels, steps = FIRST_LABELS, FIRST_STEPS
         while True:
             capacity = np.array([labels, labels], np.int64)
+            limits[kernels.MAX_STEPS] = steps
+            started = time.monotonic()
             status, codes = kernels.search(
                 rows.starts, rows.low, rows.high, rows.flags, rows.tally, rows.keys,
                 np.array(forbidden, np.uint64), limits, capacity,
             )  # fmt: skip
             full = max(status[kernels.LABELS], status[kernels.STATES]) >= labels
-            if not full or labels >= task.effort.labels:
+            long = status[kernels.STEPS] > steps
+            most = (full and labels >= task.effort.labels) or (long and steps >= task.effort.steps)
+            if not (full or long) or most or self.late(GROWTH * (time.monotonic() - started)):
                 break
-            labels *= 8
+            labels, steps = labels * (GROWTH if full else 1), steps * (GROWTH if long else 1)
         borders = _decoded(rows, codes) if len(codes) else None
         return borders, bool(status[kernels.COMPLETE])
 
@@ -236,6 +273,8 @@ class Aligner:
             return None, self._without(node, parts, columns)
         if tight:
             return exact, []
+        if len(node.box) == 1 and not task.splits and not node.leaf:
+            return exact, self._ranges(node, task, exact)
         if node.parent != path.borders and (halves := self._halves(node, path, exact)):
             return exact, halves
         every = [(i, j) for i, part in enumerate(parts) for j in range(part.count)]
@@ -252,6 +291,41 @@ class Aligner:
             forbidden[part] = (*forbidden[part], *pair)
             out.append(replace(node, forbidden=tuple(forbidden)))
         return out
+
+    def _ranges(self, node: _Node, task: Task, exact: Alignment | None) -> list[_Node]:
+        """Cut the range of the only unsized symbol where two substrings may be equal.
+
+        Without such a size inside, every alignment's Ω is linear: the ends are searched exactly.
+        """
+        ((name, (low, high)),) = node.box.items()
+        slack = SLACK * self.direction.canvas
+        sizes = [
+            z for z in self._breakpoints(task.candidate, name) if low + slack < z < high - slack
+        ]
+        if not sizes:
+            ends = [replace(node, box={name: (end, end)}) for end in (low, high)]
+            return [*ends, replace(node, leaf=True)] if high > low else []
+        wish = dict(exact.sizes)[name] if exact is not None else (low + high) / 2
+        middle = sizes[len(sizes) // 2]
+        near = min(sizes, key=lambda z: abs(z - wish))
+        cut = near if abs(near - wish) <= slack else middle
+        return [replace(node, box={name: span}) for span in ((low, cut), (cut, high))]
+
+    def _breakpoints(self, candidate: Candidate, name: str) -> list[float]:
+        """Return all sizes at which some substrings of two of the words are equal."""
+        key = candidate.words, name
+        if key not in self._known:
+            own, others = set[Line](), set[Line]()
+            for word in set(candidate.words):
+                for first in range(len(word)):
+                    for end in range(first + 1, len(word) + 1):
+                        if word[end - 1].transparent != word[first].transparent:
+                            break
+                        line = substring_line(self.direction, word[first:end], name)
+                        (own if line[0] else others).add(line)
+            meets = {(b - a) / k for k, a in own for _, b in others} | crossings(own)
+            self._known = {key: sorted(meets)}
+        return self._known[key]
 
     def _halves(self, node: _Node, path: Alignment, exact: Alignment | None) -> list[_Node]:
         """Cut the widest range of an unsized symbol, where the path's own optimum lies."""

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .candidates import Bounds, point_in
 from .problem import SLACK, Alignment, Candidate, Direction, Span
+from .words import Letter
 
 Box = Mapping[str, tuple[float, float]]
 Borders = tuple[tuple[Span, ...], ...]
+Line = tuple[int, float]  # slope and height
 
 
 def evaluate(
@@ -128,8 +130,49 @@ def least_error(
     fits = len(path.candidate.parts) < 2 and guessed.sigma <= limit
     if guessed.omega <= path.omega + SLACK * direction.canvas and fits:
         return guessed
+    if len(box) == 1 and not path.pieces and (scanned := _scanned(direction, path, box, limit)):
+        return scanned
     solved = _Programme(direction, path, bounds, box, limit).solve()
     return None if solved is None else _at(direction, path, tolerance, solved)
+
+
+def _scanned(direction: Direction, path: Alignment, box: Box, limit: float) -> Alignment | None:
+    """Return the best size of the only unsized symbol: Ω is convex and linear in between.
+
+    None where the limit of Σ cuts the least Ω off, or there is no admitted size.
+    """
+    ((name, (low, high)),) = box.items()
+    sizes = {low, high, *(z for z in path_breakpoints(direction, path, name) if low < z < high)}
+    tried = [_at(direction, path, path.tolerance, {name: size}) for size in sorted(sizes)]
+    best = min(tried, key=lambda one: (one.omega, abs(one.sigma - direction.canvas)))
+    return best if best.sigma <= limit else None
+
+
+def path_breakpoints(direction: Direction, path: Alignment, name: str) -> set[float]:
+    """Return the sizes (m) of an unsized symbol at which two substrings of a column are equal."""
+    out = set()
+    for column in range(path.count):
+        rows = {
+            substring_line(direction, letters, name)
+            for row in range(len(path.candidate.words))
+            if (letters := path.column(row, column))
+        }
+        out |= crossings(rows)
+    return out
+
+
+def substring_line(direction: Direction, letters: Sequence[Letter], name: str) -> Line:
+    """Return (count, known): a substring is count · size(name) + known metres."""
+    known = sum(direction.rules[a.symbol].size or 0.0 for a in letters)
+    return sum(a.symbol == name for a in letters), round(known, 9)
+
+
+def crossings(lines: Iterable[Line]) -> set[float]:
+    """Return where lines of different slope meet."""
+    rows = sorted(lines)
+    return {
+        round((b - a) / (k - n), 12) for i, (k, a) in enumerate(rows) for n, b in rows[:i] if k != n
+    }
 
 
 def _at(

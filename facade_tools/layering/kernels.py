@@ -23,7 +23,7 @@ from ..compiled import compiled
 # Columns of the label table.
 OMEGA, SIGMA, PIECES, COLUMNS, PARENT, STATE, NEXT, ALIVE = range(8)
 # Entries of `limits`.
-BUDGET, WIDEST, CANVAS, SPLITS, MAX_STEPS, BEAM, LOOSE = range(7)
+BUDGET, WIDEST, CANVAS, SPLITS, MAX_STEPS, BEAM, LOOSE, FLOOR = range(8)
 # Entries of `status`.
 BEST, COMPLETE, STEPS, LABELS, STATES = range(5)
 
@@ -40,7 +40,7 @@ def search(
     tally: Array,  # (letters, symbols) 1 where the letter is of the symbol
     keys: Array,  # (letters,) random 64-bit number of the letter's symbol
     forbidden: Array,  # (f,) hashes of columns that must not be used
-    limits: Array,  # (7,) budget of Ω, greatest Σ, canvas, splits, steps, beam, loose
+    limits: Array,  # (8,) budget of Ω, greatest Σ, canvas, splits, steps, beam, loose, least Σ
     capacity: Array,  # (2,) labels, states
 ) -> Any:
     """Return (status, codes): the best alignment's borders as (columns + 1, m) row codes.
@@ -51,13 +51,13 @@ def search(
     m = len(starts) - 1
     total = starts[m]
     prefix_low, prefix_high = np.zeros(total + m, np.int64), np.zeros(total + m, np.int64)
-    solid, unseen = np.zeros(total + m, np.int64), np.zeros(total + m, np.int64)
+    solid = np.zeros(total + m, np.int64)
     for r in range(m):
         for p in range(starts[r], starts[r + 1]):
             prefix_low[p + r + 1] = prefix_low[p + r] + low[p]
             prefix_high[p + r + 1] = prefix_high[p + r] + high[p]
             solid[p + r + 1] = solid[p + r] + flags[p, 1]
-            unseen[p + r + 1] = unseen[p + r] + flags[p, 2]
+    order, able = _row_order(m, starts, solid)
     max_labels, max_states = capacity[0], capacity[1]
     labels = np.zeros((max_labels, 8), np.int64)
     wide = m if limits[SPLITS] else 0
@@ -74,11 +74,10 @@ def search(
     head[0], bucket[0] = 0, 0
     slots[_slot(codes, codes[0], slots)] = 0
     # What each row takes in the column under construction.
-    option = np.zeros(m + 1, np.int64)
+    option = np.zeros(m + 1, np.int64)  # by place in the order of rows
     ends, opens = np.zeros(m, np.int64), np.zeros(m, np.int64)
     upper, lower = np.zeros(m + 1, np.int64), np.zeros(m + 1, np.int64)
-    opaque, covered = np.zeros(m + 1, np.int64), np.zeros(m + 1, np.int64)
-    cut = np.zeros(m + 1, np.int64)
+    opaque, cut = np.zeros(m + 1, np.int64), np.zeros(m + 1, np.int64)
     full_low, full_high = np.zeros(m, np.int64), np.zeros(m, np.int64)
     code, grip = np.zeros(m, np.int64), np.zeros((max(wide, 1), 2), np.int64)
     pair = np.zeros((2, tally.shape[1]), np.int64)
@@ -90,52 +89,55 @@ def search(
             while label >= 0:
                 if labels[label, ALIVE] and labels[label, OMEGA] <= bar:
                     spare = limits[BUDGET] - labels[label, OMEGA]
-                    r = 0
+                    k = 0
                     option[0] = -1
                     upper[0], lower[0] = 0, np.int64(2**62)
-                    opaque[0], covered[0], cut[0] = 0, 0, 0
-                    while r >= 0:
+                    opaque[0], cut[0] = 0, 0
+                    while k >= 0:
                         status[STEPS] += 1
                         if status[STEPS] > limits[MAX_STEPS]:
                             status[COMPLETE] = 0
                             break
-                        if r == m:
-                            if upper[m] > 0 or lower[m] < 2**62:
+                        if k == m:
+                            if lower[m] < 2**62:
                                 _finish(
                                     m, starts, low, high, flags, tally, keys, forbidden, limits,
                                     prefix_low, labels, reach, codes, head, chain, bucket, slots,
                                     status, label, state, ends, opens, upper[m], lower[m],
                                     opaque[m], cut[m], full_low, full_high, code, grip, pair,
                                 )  # fmt: skip
-                            r -= 1
+                            k -= 1
                             continue
-                        option[r] += 1
+                        if not (opaque[k] or able[k] or limits[LOOSE]):
+                            k -= 1
+                            continue
+                        r = order[k]
+                        option[k] += 1
                         here = codes[state, r]
                         p, inside, gap = here >> 2, (here >> 1) & 1, here & 1
                         first, last = starts[r], starts[r + 1]
                         q = first + p
-                        take = option[r]
+                        take = option[k]
                         if take == 0:  # nothing
                             if inside or (p > 0 and flags[q - 1, 3]):
                                 continue
                             rest = prefix_low[last + r] - prefix_low[q + r]
-                            if labels[label, SIGMA] + upper[r] + rest > limits[WIDEST]:
+                            if labels[label, SIGMA] + upper[k] + rest > limits[WIDEST]:
                                 continue
                             ends[r], opens[r] = p, 0
-                            upper[r + 1], lower[r + 1] = upper[r], lower[r]
-                            opaque[r + 1], covered[r + 1] = opaque[r], covered[r]
-                            cut[r + 1] = cut[r]
-                            r += 1
-                            option[r if r < m else m] = -1
+                            upper[k + 1], lower[k + 1] = upper[k], lower[k]
+                            opaque[k + 1], cut[k + 1] = opaque[k], cut[k]
+                            k += 1
+                            option[k] = -1
                             continue
                         if q >= last or (gap and flags[q, 3]):
-                            r -= 1
+                            k -= 1
                             continue
                         clear = flags[q, 0]
                         end = q + take // 2
                         opened = take & 1
                         if end > flags[q, 4] or (opened and end >= flags[q, 4]):
-                            r -= 1
+                            k -= 1
                             continue
                         if opened and not (clear and limits[SPLITS]):
                             continue
@@ -156,17 +158,13 @@ def search(
                             if opened:
                                 cap += high[end]
                                 pieces += 1
-                        largest, smallest = max(upper[r], need), min(lower[r], cap)
+                        largest, smallest = max(upper[k], need), min(lower[k], cap)
                         rest = prefix_low[last + r] - prefix_low[end + r]
                         if (
-                            need - lower[r] > spare
+                            need - lower[k] > spare
                             or labels[label, SIGMA] + largest > limits[WIDEST]
                         ):
-                            r -= 1
-                            continue
-                        stop = end + opened
-                        if covered[r] and unseen[stop + r] > unseen[q + r]:
-                            r -= 1
+                            k -= 1
                             continue
                         if largest - smallest > spare:
                             continue
@@ -174,19 +172,34 @@ def search(
                             continue
                         ends[r], opens[r] = end - first, opened
                         full_low[r], full_high[r] = bottom, top
-                        upper[r + 1], lower[r + 1] = largest, smallest
+                        upper[k + 1], lower[k + 1] = largest, smallest
                         whole = not clear and solid[end + r] - solid[q + r] == end - q
-                        opaque[r + 1] = 1 if whole else opaque[r]
-                        covered[r + 1] = covered[r] if clear else 1
-                        cut[r + 1] = cut[r] + pieces
-                        r += 1
-                        option[r if r < m else m] = -1
+                        opaque[k + 1] = 1 if whole else opaque[k]
+                        cut[k + 1] = cut[k] + pieces
+                        k += 1
+                        option[k] = -1
                 label = labels[label, NEXT]
             state = chain[state]
         if status[STEPS] > limits[MAX_STEPS]:
             break
     status[BEST] = _best(bucket[total], chain, head, labels, codes, starts, limits, status)
     return status, _path(status[BEST], labels, codes)
+
+
+@compiled
+def _row_order(m: int, starts: Array, solid: Array) -> Any:
+    """Return rows with most opaque letters first, and whether such are left from each place on.
+
+    A column needs an opaque substring, and the first one that is chosen narrows all others.
+    """
+    count = np.empty(m, np.int64)
+    for r in range(m):
+        count[r] = solid[starts[r + 1] + r] - solid[starts[r] + r]
+    order = np.argsort(-count, kind="mergesort")
+    able = np.zeros(m + 1, np.int64)
+    for k in range(m - 1, -1, -1):
+        able[k] = 1 if count[order[k]] > 0 else able[k + 1]
+    return order, able
 
 
 @compiled
@@ -260,6 +273,8 @@ def _finish(
     """Check the column that every row has chosen for, and add its label."""
     if not opaque and not limits[LOOSE]:
         return
+    if _occluded(m, starts, flags, codes[state], ends, opens):
+        return
     size = labels[label, SIGMA] + upper
     omega = labels[label, OMEGA] + max(np.int64(0), upper - lower)
     splits = limits[SPLITS] > 0
@@ -302,6 +317,23 @@ def _finish(
         slots[at], label, omega, size, labels[label, PIECES] + cut, m, starts, limits,
         prefix_low, labels, reach, codes, head, status, grip,
     )  # fmt: skip
+
+
+@compiled
+def _occluded(m: int, starts: Array, flags: Array, code: Array, ends: Array, opens: Array) -> bool:
+    """Tell whether an unoccludable letter has a layer above it that is not transparent."""
+    covered = False
+    for r in range(m):
+        p, inside = code[r] >> 2, (code[r] >> 1) & 1
+        if ends[r] == p and not opens[r] and not inside:
+            continue
+        q = starts[r] + p
+        if covered:
+            for k in range(q, starts[r] + ends[r] + opens[r]):
+                if flags[k, 2]:
+                    return True
+        covered = covered or not flags[q, 0]
+    return False
 
 
 @compiled
@@ -396,9 +428,9 @@ def _add_label(
         if not labels[other, ALIVE]:
             other = labels[other, NEXT]
             continue
-        if _better(other, fresh, m, labels, reach, codes, full, limits[SPLITS]):
+        if _better(other, fresh, m, labels, reach, codes, full, limits):
             return
-        if _better(fresh, other, m, labels, reach, codes, full, limits[SPLITS]):
+        if _better(fresh, other, m, labels, reach, codes, full, limits):
             labels[other, ALIVE] = 0
         before = other
         other = labels[other, NEXT]
@@ -409,12 +441,17 @@ def _add_label(
 
 @compiled
 def _better(
-    a: int, b: int, m: int, labels: Array, reach: Array, codes: Array, full: bool, splits: int
-) -> bool:
+    a: int, b: int, m: int, labels: Array, reach: Array, codes: Array, full: bool,
+    limits: Array,
+) -> bool:  # fmt: skip
     """Tell whether whatever completes label b completes label a at least as well."""
     if labels[a, OMEGA] > labels[b, OMEGA] or labels[a, SIGMA] > labels[b, SIGMA]:
         return False
-    if splits:
+    if limits[FLOOR] and (
+        labels[a, OMEGA] - labels[a, SIGMA] > labels[b, OMEGA] - labels[b, SIGMA]
+    ):
+        return False
+    if limits[SPLITS]:
         for r in range(m):
             if reach[a, r, 0] < reach[b, r, 0] or reach[a, r, 1] > reach[b, r, 1]:
                 return False
@@ -461,8 +498,11 @@ def _best(
             finished = finished and codes[state, r] >> 1 == 2 * (starts[r + 1] - starts[r])
         label = head[state] if finished else -1
         while label >= 0:
-            if labels[label, ALIVE] and (
-                best < 0 or _wins(label, best, m, labels, codes, limits[CANVAS])
+            within = _lifted(label, labels, limits) <= limits[BUDGET]
+            if (
+                labels[label, ALIVE]
+                and within
+                and (best < 0 or _wins(label, best, m, labels, codes, limits))
             ):
                 best = label
             label = labels[label, NEXT]
@@ -471,9 +511,21 @@ def _best(
 
 
 @compiled
-def _wins(a: int, b: int, m: int, labels: Array, codes: Array, canvas: int) -> bool:
-    if labels[a, OMEGA] != labels[b, OMEGA]:
-        return bool(labels[a, OMEGA] < labels[b, OMEGA])
+def _lifted(a: int, labels: Array, limits: Array) -> int:
+    """Return a label's Ω, and what it must grow by for Σ to reach its floor.
+
+    The topmost word reaches the floor; with unsized symbols Σ is only a lower bound, and every
+    column that grows, grows its error by as much.
+    """
+    return labels[a, OMEGA] + max(np.int64(0), limits[FLOOR] - labels[a, SIGMA])
+
+
+@compiled
+def _wins(a: int, b: int, m: int, labels: Array, codes: Array, limits: Array) -> bool:
+    canvas = limits[CANVAS]
+    x, y = _lifted(a, labels, limits), _lifted(b, labels, limits)
+    if x != y:
+        return bool(x < y)
     if labels[a, PIECES] != labels[b, PIECES]:
         return bool(labels[a, PIECES] < labels[b, PIECES])
     if labels[a, COLUMNS] != labels[b, COLUMNS]:

@@ -12,7 +12,7 @@ from .candidates import Generator
 from .problem import SLACK, TOLERANCES, Alignment, Candidate, Direction
 
 BUDGETS = (0.0, 1 / 16, 1 / 4, 1.0)  # of µ: Ω is looked for from below
-QUICK = Effort(labels=20_000, steps=400_000, nodes=8, beam=24)
+QUICK = Effort(labels=20_000, steps=400_000, nodes=64, beam=24)
 MAX_CANDIDATES = 100_000  # kept of one group at one tolerance
 
 Accept = Callable[[Alignment], bool]
@@ -44,10 +44,10 @@ class Clock:
     until: float = float("inf")
     late: bool = field(default=False)
 
-    def over(self) -> bool:
-        """Tell whether the time is up."""
+    def over(self, ahead: float = 0.0) -> bool:
+        """Tell whether the time is up, or will be in some seconds."""
         self.late = self.late or time.monotonic() > self.until
-        return self.late
+        return self.late or time.monotonic() + ahead > self.until
 
     def share(self, part: float) -> Clock:
         """Return a clock for a part of the time that is left."""
@@ -68,7 +68,7 @@ class GroupSearch:
     ) -> None:
         self.direction, self.groups, self.clock = direction, groups, clock
         self.effort = effort or Effort()
-        self.aligner = Aligner(direction, lambda: self.clock.over())
+        self.aligner = Aligner(direction, lambda ahead: self.clock.over(ahead))
         self._kept: dict[float, tuple[list[Candidate], Generator]] = {}
 
     def answer(self) -> Answer | None:

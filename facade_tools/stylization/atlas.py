@@ -14,6 +14,7 @@ from ..imaging.image_io import Picture
 
 PADDING = 8  # pixels of the border's own colour around every picture: three mip levels
 LARGEST_PAGE = 8192
+USUAL_HEIGHT = 4096  # a page ends here unless one picture is higher
 QUALITY = 95  # of JPEG
 
 
@@ -70,7 +71,7 @@ def _shelves(sizes: np.ndarray, width: int) -> tuple[list[int], list[tuple[int, 
         rows, columns = (int(v) for v in sizes[i])
         if x + columns > width:
             x, y, shelf = 0, y + shelf, 0
-        if y + rows > LARGEST_PAGE:
+        if y + rows > max(USUAL_HEIGHT, rows):
             heights.append(y)
             current, x, y, shelf = current + 1, 0, 0, 0
         page[i], corner[i] = current, (x, y)

@@ -120,7 +120,7 @@ def _main_angle(walls: Points3) -> float:
     near = np.abs(np.sin(2 * (angle - best))) < math.sin(math.radians(4))
     phase = np.sum(area[near] * np.exp(4j * (angle[near] - best)))
     refined = best + float(np.angle(phase)) / 4
-    return 0.0 if abs(math.remainder(refined, math.pi / 2)) < 1e-5 else refined
+    return 0.0 if abs(math.remainder(refined, math.pi / 2)) < 1e-9 else refined
 
 
 def _quarter(mesh: TexturedMesh, vectors: Points3, turn: float, front: float | None) -> float:

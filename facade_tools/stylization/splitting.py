@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..geometry.arrays import Booleans, Floats
 
 SMOOTHNESS = 0.025  # λ of eq. 3
+CROWDED = 0.8  # S_r below this: more windows fit than look right
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,13 +136,13 @@ def split(rule: SplitRule, size: float) -> Split:
     """Cut a face of `size` metres: repeat insertable sections, scale the others (eq. 8 and 9).
 
     Eq. 8 packs as many windows as fit. Where the scalable sections would be squeezed to less
-    than half, the number of windows whose |log S_r| is least is taken instead.
+    than 80%, the number of windows whose |log S_r| is least is taken instead.
     """
     if not rule.insertable:
         return Split((0,), (size,), 0, size / rule.size)
     packed = _count(rule, size)
     chosen = _arranged(rule, size, packed)
-    if chosen.stretch >= 0.5:
+    if chosen.stretch >= CROWDED:
         return chosen
     options = (_arranged(rule, size, count) for count in range(packed, -1, -1))
     return min(options, key=lambda option: abs(math.log(max(option.stretch, 1e-9))))

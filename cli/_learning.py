@@ -119,11 +119,13 @@ def compare(rows: list[Attributes], options: Any, splits: int, seed: int) -> Any
     """Print the held-out table of all variants on standard error and return it."""
     import click
 
-    from facade_tools.exteriors.holdout import compare_variants, table_lines
+    from facade_tools.exteriors.holdout import compare_variants, table_lines, training_curve
 
     table = compare_variants(rows, splits, seed=seed, options=options)
     for line in table_lines(table):
         click.echo(line, err=True)
+    for size, nll in training_curve(rows, seed=seed, options=options):
+        click.echo(f"{size:6d} training rows: {nll:9.3f}", err=True)
     return table
 
 

@@ -17,7 +17,7 @@ from facade_tools.exteriors.dataset import build, fit_scaling
 from facade_tools.exteriors.em import Prior, Statistics, Stop, run, unit_weights
 from facade_tools.exteriors.evaluation import negative_log_density
 from facade_tools.exteriors.groups import BitGroup, Coordinate
-from facade_tools.exteriors.holdout import compare_variants, splits
+from facade_tools.exteriors.holdout import compare_variants, splits, training_curve
 from facade_tools.exteriors.layout import GroupLayout, Layout, building_layout
 from facade_tools.exteriors.learning import LearnOptions, learn_model, learn_readings
 from facade_tools.exteriors.network import Family, Network, infer
@@ -200,8 +200,8 @@ def test_a_known_model_is_recovered():
     model = learn_readings(as_readings(*draw(1000)), layout, rng=rng, options=options)
     wanted = {frozenset((f"g{a}", f"g{b}")) for a, b in ((0, 1), (1, 3), (2, 4))}
     found = {frozenset(edge) for edge in model.edges}
-    hits = len(wanted & found)
-    assert 2 * hits / (len(wanted) + len(found)) >= 0.85
+    assert wanted <= found
+    assert len(found - wanted) <= 2
     values, bits = draw(1000)
     from facade_tools.exteriors.density import log_density
 
@@ -282,7 +282,7 @@ def test_every_variant_learns_the_same_schema(houses, variant):
 
 
 def test_faithful_and_restarts_learn(houses):
-    options = LearnOptions(faithful=True, largest=2, restarts=2)
+    options = LearnOptions("no-lateral", faithful=True, largest=2, restarts=2)
     model = learn_model(houses[::6], rng=np.random.default_rng(0), options=options)
     assert model.faithful
     assert all(c.transform == "identity" for g in model.groups for c in g.coordinates)
@@ -298,7 +298,8 @@ def test_what_nobody_observes_comes_from_the_prior(houses):
         )
         for h in houses[:40]
     ]
-    model = learn_model(rows, rng=np.random.default_rng(0), options=LearnOptions(largest=2))
+    options = LearnOptions("no-lateral", largest=2)
+    model = learn_model(rows, rng=np.random.default_rng(0), options=options)
     assert {"sym.front", "porch_front", "porch_front.px"} <= set(model.unobserved)
     assert "wwr.front" not in model.unobserved
     assert model.count == 40
@@ -324,12 +325,18 @@ def test_splits_are_disjoint_and_repeat():
 
 
 def test_comparison_pairs_the_same_rows(houses):
-    table = compare_variants(
-        houses[::6], 1, options=LearnOptions(largest=2), variants=("full", "flat")
-    )
-    assert [row.variant for row in table] == ["full", "flat"]
+    options = LearnOptions(largest=2)
+    table = compare_variants(houses[::6], 1, options=options, variants=("no-lateral", "flat"))
+    assert [row.variant for row in table] == ["no-lateral", "flat"]
     assert table[0].difference == 0.0
     assert table[0].rows == table[1].rows == 10
+
+
+def test_training_curve_uses_more_and_more_rows(houses):
+    options = LearnOptions("no-lateral", largest=2)
+    curve = training_curve(houses[::4], options=options, shares=(0.5, 1.0))
+    assert [rows for rows, _ in curve] == [29, 58]
+    assert np.isfinite([nll for _, nll in curve]).all()
 
 
 def test_a_table_of_any_kind(tmp_path):

@@ -60,6 +60,12 @@ def assert_possible(a: Attributes) -> None:
         assert 0 <= exposure <= 1
     for porch, back in zip(m.porch, (False, True), strict=True):
         assert not any(porch) or (porch[1] >= 0.5) == back
+        if gw and porch[2]:
+            gaps = [
+                abs(m.garage[i] - porch[i]) * size - (m.garage[2 + i] + porch[2 + i]) / 2
+                for i, size in ((0, w), (1, d))
+            ]
+            assert max(gaps) >= -1e-6
     assert all(0 <= x < 1 for x in a.facade.wwr)
     assert all(0 <= x <= 1 for x in (*a.facade.sym, *a.facade.align))
     assert any(a.element.roof.values())

@@ -57,6 +57,25 @@ def compare_variants(
     return tuple(_compared(v, np.concatenate(found[v]), first) for v in variants)
 
 
+def training_curve(
+    rows: Sequence[Attributes],
+    *,
+    seed: int = 0,
+    options: LearnOptions | None = None,
+    shares: Sequence[float] = (0.125, 0.25, 0.5, 1.0),
+) -> tuple[tuple[int, float], ...]:
+    """Return training rows and held-out mean NLL for growing parts of the first split's 80%."""
+    train, test = next(splits(len(rows), 1, seed))
+    held = [rows[i] for i in test]
+    out = []
+    for share in shares:
+        part = [rows[i] for i in train[: max(2, round(share * len(train)))]]
+        rng = item_generator(seed, "curve", len(part))
+        model = learn_model(part, rng=rng, options=options or LearnOptions())
+        out.append((len(part), float(negative_log_density(model, held).mean())))
+    return tuple(out)
+
+
 def _compared(variant: str, nll: Floats, first: Floats) -> Comparison:
     root = float(np.sqrt(len(nll)))
     gap = nll - first

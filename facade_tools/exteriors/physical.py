@@ -51,7 +51,8 @@ def settle(
     """Move complete rows, in place, to what is possible.
 
     Ranges; r2 only above an r1; the garage inside the bounding box and not higher; porches on
-    their side of the middle. fixed (n, d) a group: 1 where a value is given and must stay.
+    their side of the middle and outside the garage. fixed (n, d) a group: 1 where a value is given
+    and must stay.
     """
     _ranges(values, layout, fixed)
     no_second_floor(values, layout)
@@ -63,6 +64,30 @@ def settle(
             limit = MIDDLE + sign * GAP
             moved = np.minimum(place[0], limit) if sign < 0 else np.maximum(place[0], limit)
             _put(place[0], moved, held, f"{name}.py")
+            _out_of_garage(columns, held, name, sign)
+
+
+def _out_of_garage(columns: Columns, held: Columns | None, name: str, sign: int) -> None:
+    """Push a porch that meets the garage in plan aside or outwards, whichever is nearer.
+
+    A porch cannot stand in a garage; no coordinate by itself says so.
+    """
+    found = columns.get("width", "depth", *(f"garage.{c}" for c in PLAN))
+    porch = columns.get(*(f"{name}.{c}" for c in PLAN))
+    if not found or not porch:
+        return
+    w, d, gx, gy, gw, gd = found
+    px, py, pw, pd = porch
+    here = np.isfinite(gw) & np.isfinite(pw)
+    side = np.where(px >= gx, 1.0, -1.0)
+    with np.errstate(invalid="ignore"):  # absent parts are infinite and left alone
+        aside = gx + side * (gw + pw) / 2 / w
+        outside = gy + sign * (gd + pd) / 2 / d
+        across, along = (aside - px) * side * w, (outside - py) * sign * d
+        meets = here & (across > 0) & (along > 0)
+        least = np.minimum(across, along)
+    _put(px, np.where(meets & (across <= least), aside, px), held, f"{name}.px")
+    _put(py, np.where(meets & (along <= least), outside, py), held, f"{name}.py")
 
 
 def _ranges(values: tuple[Floats, ...], layout: Layout, fixed: tuple[Bits, ...] | None) -> None:
@@ -82,6 +107,7 @@ def _put(column: Floats, moved: Floats, held: Columns | None, name: str) -> None
     column[free] = moved[free]
 
 
+PLAN = ("px", "py", "width", "depth")
 SIZES = (("px", "width"), ("py", "depth"))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from importlib import import_module
 from typing import Any, TypeVar
@@ -24,12 +24,18 @@ def load(target: str) -> Callable[..., Any]:
     return function
 
 
-def each(name: str, function: Callable[[RawItem], R], stream: StreamOptions) -> Iterator[R]:
+def each(
+    name: str,
+    function: Callable[[RawItem], R],
+    stream: StreamOptions,
+    items: Iterable[RawItem] | None = None,
+) -> Iterator[R]:
     """Yield `function` of every item, in order, with progress and --on-error as asked for.
 
-    The last thing that it does after skipped items is to raise InvalidInput.
+    items: default is all inputs of the stream. The last thing that it does after skipped items is
+    to raise InvalidInput.
     """
-    items = read_raw(stream.inputs)
+    items = read_raw(stream.inputs) if items is None else items
     outcomes = map_ordered(function, items, jobs=stream.jobs, scheduler=stream.scheduler)
     progress = Progress(name)
     bad = 0

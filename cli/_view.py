@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
 import click
 import numpy as np
 
-from facade_tools.artifacts.store import RawItem
+from facade_tools.artifacts.store import RawItem, read_raw
 from facade_tools.artifacts.writing import write_bytes
 from facade_tools.errors import FacadeError, InvalidInput
 from facade_tools.formats.gltf import write as write_glb
@@ -28,6 +29,8 @@ from ._options import StreamOptions
 from .view import DRAWINGS
 
 MOST_PICTURES = 2000
+LARGE = (960, 720)  # pixels of the only picture
+SMALL = (400, 300)  # of one of several
 
 
 @dataclass(frozen=True)
@@ -123,16 +126,11 @@ def _labels(name: str, count: int, options: ViewOptions) -> list[str]:
 
 def _rendered(stream: StreamOptions, options: ViewOptions) -> Any:
     """Yield id and pictures of each item; a single item gets the larger picture."""
-    several = (400, 300)
-    if options.size is None and not (options.sides or options.mass):
-        first_two: list[tuple[str, Any]] = []
-        for drawn in each("view", Drawing(), stream):
-            first_two.append(drawn)
-        size = (960, 720) if len(first_two) == 1 else several
-        drawing = Drawing(_views(options, size))
-        return [(name, drawing.seen(shown)) for name, shown in first_two]
-    views = _views(options, options.size or several)
-    return each("view", Drawing(views, options.mass), stream)
+    items = read_raw(stream.inputs)
+    first = list(islice(items, 2))
+    alone = len(first) == 1 and not (options.sides or options.mass)
+    views = _views(options, options.size or (LARGE if alone else SMALL))
+    return each("view", Drawing(views, options.mass), stream, chain(first, items))
 
 
 def _views(options: ViewOptions, size: tuple[int, int]) -> tuple[View, ...]:

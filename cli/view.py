@@ -15,6 +15,7 @@ DRAWINGS = {
     "footprint": "facade_tools.geometry.details:footprint_scene",
     "layout": "facade_tools.layering.drawing:layout_picture",
     "attributes": "facade_tools.imaging.attribute_glyphs:attribute_glyph",
+    "model": "facade_tools.exteriors.picture:model_picture",
     "parse": "facade_tools.imaging.label_views:parse_view",
 }
 

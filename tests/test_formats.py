@@ -19,10 +19,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
+from facade_tools.artifacts.building import Roof
+from facade_tools.artifacts.footprint import Footprint
 from facade_tools.artifacts.store import read
 from facade_tools.errors import InvalidInput
 from facade_tools.formats import cityjson, gltf, obj, png
-from facade_tools.formats.city import building_model
+from facade_tools.formats.city import building_model, footprint_model
 from facade_tools.formats.cityjson import CityModel, reference_url
 from facade_tools.formats.exporting import model_files, placed
 from facade_tools.formats.meshes import read_scene
@@ -204,7 +206,9 @@ def shells(document):
 
 @pytest.fixture(scope="module")
 def city(houses):
-    models = [building_model(building) for building in houses]
+    ring = ((90.0, 0.0), (99.0, 0.0), (99.0, 4.0), (94.0, 4.0), (94.0, 9.0), (90.0, 9.0))
+    plan = Footprint("way", (ring,), 5.0, Roof("hip", 30.0))
+    models = [*(building_model(building) for building in houses), footprint_model(plan)]
     return json.loads(cityjson.write(placed(models, "auto"), "all"))
 
 
@@ -220,7 +224,7 @@ def test_every_edge_of_every_solid_is_used_once_in_each_direction(city):
         assert len(set(edges)) == len(edges), (key, shape["lod"])
         assert set(edges) == {(b, a) for a, b in edges}, (key, shape["lod"])
         count += 1
-    assert count == 2 * len(HOUSES)
+    assert count == 2 * len(HOUSES) + 1
 
 
 def test_faces_are_planar_to_a_tenth_of_a_millimetre(city):

@@ -76,13 +76,13 @@ def garage_door_parts(element: Element) -> Parts:
     parts: Parts = {"trim": casing(u0, v0, u1, v1, floor=True), "garage-door": [], "glass": []}
     for j in range(rows):
         low, high = v0 + (v1 - v0) * j / rows, v0 + (v1 - v0) * (j + 1) / rows
-        parts["garage-door"].append((u0, low + 0.012, 0.0, u1, high, 0.03))
+        parts["garage-door"].append((u0, low + 0.022, 0.0, u1, high, 0.03))
         material = "glass" if j == rows - 1 and rows > 2 else "garage-door"
         for i in range(columns):
             a = u0 + (u1 - u0) * i / columns + 0.06
             b = u0 + (u1 - u0) * (i + 1) / columns - 0.06
-            parts[material].append((a, low + 0.09, 0.03, b, high - 0.08, 0.045))
+            parts[material].append((a, low + 0.09, 0.03, b, high - 0.08, 0.06))
             if material == "glass":
-                parts["trim"] += ring(a, low + 0.09, b, high - 0.08, 0.03, (0.03, 0.055))
+                parts["trim"] += ring(a, low + 0.09, b, high - 0.08, 0.03, (0.03, 0.07))
     parts["shadow"] = [(u0, v0, 0.0, u1, v1, 0.012)]
     return parts

@@ -85,7 +85,7 @@ def materials(colors: Colors, pattern: str = "siding") -> dict[str, Material]:
         Material("trim", colors.trim, roughness=0.6),
         Material("door", colors.door, roughness=0.5),
         Material("garage-door", _mixed(colors.trim, "#d8d8d4"), roughness=0.6),
-        Material("shadow", "#5c5a55", roughness=0.9),
+        Material("shadow", "#3c3a37", roughness=0.95),
         Material("glass", "#2c3a45", roughness=0.08),
         Material("metal", "#b9a06a", roughness=0.36, metallic=0.8),
         Material("stone", "#a9a59c", roughness=0.9),

@@ -91,7 +91,8 @@ def size_cost(limits: Bounds, state: int, length: int) -> float:
 def best_cut(costs: Costs, machine: Moves, limits: Bounds) -> Cut | None:
     """Return the cheapest cutting of the line that the automaton and the bounds allow.
 
-    Exact: a dynamic programme over (end, state), O(length² · states). None where no word fits.
+    Exact: a dynamic programme over (end, state), O(length · states · largest bounded size). None
+    where no word fits.
     Of cuttings that cost the same (within 1e-9) the one with longer last parts wins.
     """
     prefix = np.zeros((costs.shape[0], costs.shape[1] + 1))
@@ -112,6 +113,31 @@ def best_cut(costs: Costs, machine: Moves, limits: Bounds) -> Cut | None:
 
 
 @compiled
+def _window(
+    state: int,
+    at: int,
+    start: NDArray[np.float64],
+    prefix: NDArray[np.float64],
+    least: NDArray[np.int64],
+    most: NDArray[np.int64],
+    prior: NDArray[np.float64],
+    end: NDArray[np.float64],
+    begin: NDArray[np.int64],
+) -> None:
+    """Find the best origin of a state with bounds or a prior that ends at `at`."""
+    for origin in range(max(0, at - most[state]), at - least[state] + 1):
+        if start[state, origin] == np.inf:
+            continue
+        cost = start[state, origin] - prefix[state, origin]
+        if prior[state, 2] > 0.0:
+            off = (at - origin - prior[state, 0]) * prior[state, 1]
+            cost += prior[state, 2] * off * off / 2
+        if cost < end[state, at] - TIE:
+            end[state, at] = cost
+            begin[state, at] = origin
+
+
+@compiled
 def solve(
     prefix: NDArray[np.float64],
     allowed: NDArray[np.bool_],
@@ -129,19 +155,22 @@ def solve(
     for state in range(states):
         if first[state]:
             start[state, 0] = 0.0
+    least_cost = np.full(states, np.inf)
+    least_origin = np.zeros(states, np.int64)
     for at in range(1, size):
         for state in range(states):
-            low = max(0, at - most[state])
-            for origin in range(low, at - least[state] + 1):
-                if start[state, origin] == np.inf:
-                    continue
-                cost = start[state, origin] - prefix[state, origin]
-                if prior[state, 2] > 0.0:
-                    off = (at - origin - prior[state, 0]) * prior[state, 1]
-                    cost += prior[state, 2] * off * off / 2
-                if cost < end[state, at] - TIE:
-                    end[state, at] = cost
-                    begin[state, at] = origin
+            if prior[state, 2] == 0.0 and most[state] >= size - 1:
+                # no bound and no prior: the best origin so far stays the best
+                origin = at - least[state]
+                if origin >= 0 and start[state, origin] < np.inf:
+                    cost = start[state, origin] - prefix[state, origin]
+                    if cost < least_cost[state] - TIE:
+                        least_cost[state] = cost
+                        least_origin[state] = origin
+                end[state, at] = least_cost[state]
+                begin[state, at] = least_origin[state]
+            else:
+                _window(state, at, start, prefix, least, most, prior, end, begin)
             end[state, at] += prefix[state, at]
         for state in range(states):
             for other in range(states):

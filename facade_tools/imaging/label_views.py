@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..artifacts.parse import LABELS, Parse
-from .image_io import Picture, decoded
+from .image_io import Picture, fitted, read_photo
 
 COLORS = {
     "outlier": (20, 20, 20), "window": (226, 60, 50), "wall": (244, 214, 100),
@@ -42,20 +42,18 @@ def overlay(picture: Picture, parse: Parse, strength: float = 0.45) -> Picture:
 
 
 def parse_view(parse: Parse) -> Picture:
-    """Return the regions of a parse in colours."""
+    """Return a parse drawn over its picture where that very file is in the working directory.
+
+    Told by name and digest; elsewhere the regions are drawn alone.
+    """
+    path = Path(parse.image.name)
+    if path.name == parse.image.name and path.is_file():
+        photo = read_photo(str(path))
+        if photo.sha256 == parse.image.sha256 and photo.pixels.shape[1::-1] == parse.image.size:
+            return _shrunk(overlay(photo.pixels, parse))
     width, height = parse.image.size
-    canvas = np.zeros((height, width, 3), np.uint8)
-    full = overlay(canvas, parse, 1.0)
-    scale = min(1.0, MAX_VIEW / max(width, height))
-    if scale == 1.0:
-        return full
-    size = (max(1, round(width * scale)), max(1, round(height * scale)))
-    return cv2.resize(full, size, interpolation=cv2.INTER_AREA).astype(np.uint8)
+    return _shrunk(overlay(np.zeros((height, width, 3), np.uint8), parse, 1.0))
 
 
-def beside(parse: Parse, folder: Path) -> Picture:
-    """Return a parse over its picture where the folder holds that very file, else by itself."""
-    path = folder / parse.image.name
-    if not path.is_file():
-        return parse_view(parse)
-    return overlay(decoded(path.read_bytes(), str(path)), parse)
+def _shrunk(picture: Picture) -> Picture:
+    return fitted(picture, MAX_VIEW, MAX_VIEW * MAX_VIEW)

@@ -56,12 +56,15 @@ def solve(field: Field, plan: Plan) -> Solution:
     best: Layout | None = None
     reached = np.inf
     trace: list[float] = []
+    seen: set[tuple[int, ...]] = set()
     for rows in _starts(field, plan, relaxed):
         layout, path = _alternate(field, plan, rows)
         found = [(layout, path[-1])]
         if plan.per_floor:
             # the best common columns may hide floors that the picture shows
-            found = [_unfactored(field, plan, cut) for cut in (rows, layout.rows)]
+            fresh = [cut for cut in (rows, layout.rows) if _key(cut) not in seen]
+            seen.update(_key(cut) for cut in fresh)
+            found = [_unfactored(field, plan, cut) for cut in fresh]
         for layout, cost in found:
             trace.append(cost)
             if cost < reached - GAIN:
@@ -74,11 +77,15 @@ def _starts(
     field: Field, plan: Plan, relaxed: tuple[NDArray[np.float64], NDArray[np.float64]]
 ) -> list[Cut]:
     """Return different rows to start from: columns forgotten, more and less freely."""
-    cuts = {}
+    cuts: dict[tuple[int, ...], Cut] = {}
     for mix in STARTS:
         rows = _solve_rows(field, plan, (1 - mix) * relaxed[0] + mix * relaxed[1])
-        cuts.setdefault((*rows.states, *rows.bounds), rows)
+        cuts.setdefault(_key(rows), rows)
     return list(cuts.values())
+
+
+def _key(cut: Cut) -> tuple[int, ...]:
+    return (*cut.states, *cut.bounds)
 
 
 def relaxed_bound(field: Field, plan: Plan) -> float:

@@ -26,7 +26,7 @@ def rendered_pairs(count: int, seed: int) -> Iterator[Pair]:
         yield Pair(f"rendered-{number}", picture, labels)
 
 
-def make_default(count: int = 160, seed: int = 0) -> Classifier:
+def make_default(count: int = 90, seed: int = 0) -> Classifier:
     """Return the classifier trained on `count` rendered facades."""
     pairs = list(rendered_pairs(count, seed))
     rng: np.random.Generator = item_generator(seed, "default-classifier")

@@ -48,6 +48,13 @@ class Style:
     shutters: float
     curtains: float
     bars: int
+    grain: float
+    course: int
+    leaves: bool
+    surround: int
+    iron: float
+    slab: int
+    clutter: int
 
 
 def render_facade(
@@ -59,12 +66,13 @@ def render_facade(
     canvas = np.zeros((height, width, 3), np.float32)
     labels = np.zeros((height, width), np.uint8)
     found = [(leaf, _box(leaf, height)) for leaf in leaves(tree)]
-    # what hangs in front is painted after what it hides
-    for wanted in ("sky", "wall", "roof", "shop", "chimney", "window", "door", "balcony"):
+    for wanted in _PAINTERS:
         for leaf, box in found:
             if leaf.label == wanted and box[2] > box[0] and box[3] > box[1]:
                 _PAINTERS[wanted](canvas, box, style, rng)
                 labels[box[1] : box[3], box[0] : box[2]] = LABELS.index(wanted)
+        if wanted == "wall":
+            _clutter(canvas, labels == LABELS.index("wall"), style, rng)
     _cornices(canvas, tree, style, rng)
     _shade(canvas, rng)
     picture = (255 * np.clip(canvas, 0, 1)).astype(np.uint8)
@@ -90,7 +98,9 @@ def _style(rng: np.random.Generator) -> Style:
         wall, np.clip(wall * rng.uniform(0.95, 1.2), 0, 1), _pick(ROOFS, rng), _pick(SKIES, rng),
         _pick(SHOPS, rng), _pick(DOORS, rng), np.full(3, rng.uniform(0.05, 0.3), np.float32),
         frame, float(rng.uniform(0, 0.12)), float(rng.choice([0, 0, 0.15, 0.6])),
-        float(rng.uniform(0, 0.6)), int(rng.integers(0, 4)),
+        float(rng.uniform(0, 0.6)), int(rng.integers(0, 4)), float(rng.uniform(0.01, 0.05)),
+        int(rng.integers(4, 14)), bool(rng.random() < 0.2), int(rng.integers(0, 6)),
+        float(rng.uniform(0.2, 0.7)), int(rng.integers(0, 4)), int(rng.integers(0, 40)),
     )  # fmt: skip
 
 
@@ -117,8 +127,9 @@ def _sky(canvas: Canvas, box: Box, style: Style, rng: np.random.Generator) -> No
 
 
 def _wall(canvas: Canvas, box: Box, style: Style, rng: np.random.Generator) -> None:
-    _fill(canvas, box, style.wall, 0.015, rng)
-    for y in range(box[1] + (-box[1]) % 7, box[3], 7):
+    _fill(canvas, box, style.wall, style.grain, rng)
+    pitch = style.course
+    for y in range(box[1] + (-box[1]) % pitch, box[3], pitch):
         canvas[y : y + 1, box[0] : box[2]] *= 1 - style.joints
 
 
@@ -140,13 +151,19 @@ def _chimney(canvas: Canvas, box: Box, style: Style, rng: np.random.Generator) -
 
 def _window(canvas: Canvas, box: Box, style: Style, rng: np.random.Generator) -> None:
     x0, y0, x1, y1 = box
-    border = 2 + style.bars % 2
-    around = canvas[max(0, y0 - border) : y1 + 1, max(0, x0 - border) : x1 + border]
-    around[:] = np.float32(0.5) * around + np.float32(0.5) * style.trim
-    glass = np.array([0.9, 1.0, 1.1], np.float32) * np.float32(rng.uniform(0.05, 0.35))
-    part = _fill(canvas, box, glass, 0.03, rng)
+    if style.leaves and y1 - y0 > 8:  # open shutters beside the window
+        half = max(2, (x1 - x0) // 2)
+        for left in (x0 - half, x1):
+            leaf = canvas[y0:y1, max(left, 0) : left + half]
+            leaf[:] = style.frame
+            leaf[::3] *= 0.85
+    border = style.surround
+    around = canvas[max(0, y0 - border) : y1 + border // 2, max(0, x0 - border) : x1 + border]
+    around[:] = np.float32(0.4) * around + np.float32(0.6) * style.trim
+    glass = np.array([0.9, 1.0, 1.1], np.float32) * np.float32(rng.uniform(0.08, 0.45))
+    part = _fill(canvas, box, glass, 0.05, rng)
     if rng.random() < style.curtains:
-        part[:] = np.float32(0.35) * part + np.float32(rng.uniform(0.35, 0.55))
+        part[:] = np.float32(0.35) * part + np.float32(rng.uniform(0.25, 0.5))
     if rng.random() < style.shutters:
         part[:] = style.frame * np.float32(rng.uniform(0.7, 1.0))
         part[::3] *= 0.8
@@ -154,9 +171,9 @@ def _window(canvas: Canvas, box: Box, style: Style, rng: np.random.Generator) ->
     ramp = np.linspace(rng.uniform(-0.1, 0.15), rng.uniform(-0.1, 0.1), part.shape[0])
     part += ramp.astype(np.float32)[:, None, None]
     middle = part.shape[1] // 2
-    part[:, middle : middle + 1] = style.frame
+    part[:, middle - style.bars % 2 : middle + 1] = style.frame
     part[:, :1] = part[:, -1:] = style.frame * np.float32(0.9)
-    part[:1] *= 0.6  # the lintel's shadow
+    part[:2] *= 0.6  # the lintel's shadow
     for k in range(1, style.bars):
         part[k * part.shape[0] // style.bars :][:1] = style.frame
 
@@ -164,16 +181,20 @@ def _window(canvas: Canvas, box: Box, style: Style, rng: np.random.Generator) ->
 def _balcony(canvas: Canvas, box: Box, style: Style, rng: np.random.Generator) -> None:
     x0, y0, x1, y1 = box
     part = canvas[y0:y1, x0:x1]
-    # the lower half of windows stands behind a railing
     above = canvas[max(0, y0 - 1) : y0, x0:x1]
-    if above.size:
+    if above.size:  # what stands above goes on behind the railing
         part[:] = above
-    part[:] = np.float32(0.75) * part + np.float32(0.25) * style.rail
+    shape = (part.shape[0], part.shape[1])
+    part *= np.float32(rng.uniform(0.6, 0.95))
+    ornament = _noise(shape, 1.5, rng) > rng.uniform(0.0, 1.2)
+    part[:] = np.where(ornament, np.float32(0.3) * part + np.float32(0.7) * style.rail, part)
     step = 2 + style.bars % 3
-    part[:, (-x0) % step :: step] = style.rail
-    part[:: max(2, part.shape[0] // 2)] = style.rail
-    part[-2:] = style.trim * np.float32(rng.uniform(0.8, 1.0))
-    canvas[y1 : y1 + 2, x0:x1] *= 0.7
+    part[:, (-x0) % step :: step] *= np.float32(style.iron)
+    part[:1] = style.rail
+    part[-2:-1] = style.rail
+    if style.slab:
+        part[-1:] = style.trim * np.float32(rng.uniform(0.8, 1.1))
+        canvas[y1 : y1 + style.slab, x0:x1] *= 0.7
 
 
 def _door(canvas: Canvas, box: Box, style: Style, rng: np.random.Generator) -> None:
@@ -199,9 +220,35 @@ def _shop(canvas: Canvas, box: Box, style: Style, rng: np.random.Generator) -> N
 
 
 _PAINTERS: dict[str, Callable[[Canvas, Box, Style, np.random.Generator], None]] = {
-    "sky": _sky, "wall": _wall, "roof": _roof, "shop": _shop, "chimney": _chimney,
-    "window": _window, "door": _door, "balcony": _balcony,
-}  # fmt: skip
+    "sky": _sky,
+    "wall": _wall,
+    "roof": _roof,
+    "shop": _shop,
+    "chimney": _chimney,
+    "window": _window,
+    "door": _door,
+    "balcony": _balcony,
+}  # fmt: skip; what hangs in front comes after what it hides
+
+
+def _clutter(
+    canvas: Canvas, wall: NDArray[np.bool_], style: Style, rng: np.random.Generator
+) -> None:
+    """Put mouldings, pilasters, pipes and stains on walls: dark and bright, wide and narrow."""
+    height, width = wall.shape
+    factor = np.ones((height, width), np.float32)
+    for _ in range(style.clutter):
+        y, x = int(rng.integers(height)), int(rng.integers(width))
+        thick, gain = int(rng.integers(1, 6)), np.float32(rng.uniform(0.72, 1.2))
+        if rng.random() < 0.7:
+            left = 0 if rng.random() < 0.6 else x
+            factor[y : y + thick, left : left + int(rng.integers(20, width + 21))] *= gain
+            factor[y + thick : y + thick + 1, left:] *= np.float32(0.85)
+        else:
+            factor[y : y + int(rng.integers(10, height)), x : x + thick] *= gain
+    factor += np.float32(rng.uniform(0, 0.06)) * _noise((height, width), 3.0, rng)[:, :, 0]
+    factor += np.float32(rng.uniform(0, 0.06)) * _noise((height, width), 40.0, rng)[:, :, 0]
+    canvas[wall] *= factor[wall][:, None]
 
 
 def _cornices(canvas: Canvas, tree: Node, style: Style, rng: np.random.Generator) -> None:

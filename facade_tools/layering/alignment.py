@@ -22,7 +22,8 @@ from .words import Word
 Box = Mapping[str, tuple[float, float]]
 Key = tuple[float, int, int, float, tuple[Any, ...]]
 
-FIRST_LABELS = 2_000
+MANY_LAYERS = 4  # more than these: with Ω = 0 equal words are not aligned apart for more columns
+FIRST_LABELS = 4_000
 FIRST_STEPS = 300_000
 GROWTH = 8
 MOST_LABELS = 500_000
@@ -200,14 +201,15 @@ class Aligner:
     ) -> tuple[Borders | None, bool]:
         merged = self.maker.rows(words, node.box, True)
         twins = len(merged.words) < len(words)
-        limits = self._limits(task, twins and not task.splits, ease, bool(node.box))
-        borders, complete = self._run(merged, task, limits, node.forbidden[part])
-        if borders is None or not twins or self._covered(words, borders):
+        strict = self._limits(task, False, ease, bool(node.box))
+        if not twins or (len(words) > MANY_LAYERS and task.budget == 0.0):
+            return self._run(merged, task, strict, node.forbidden[part])
+        loose = self._limits(task, not task.splits, ease, bool(node.box))
+        borders, complete = self._run(merged, task, loose, node.forbidden[part])
+        if borders is None or self._covered(words, borders):
             return borders, complete
         rows = self.maker.rows(words, node.box, False)
-        return self._run(
-            rows, task, self._limits(task, False, ease, bool(node.box)), node.forbidden[part]
-        )
+        return self._run(rows, task, strict, node.forbidden[part])
 
     def _covered(self, words: tuple[Word, ...], borders: Borders) -> bool:
         """Tell whether every column has a substring that is opaque throughout."""

@@ -16,6 +16,8 @@ DRAWINGS = {
     "layout": "facade_tools.layering.drawing:layout_picture",
     "attributes": "facade_tools.imaging.attribute_glyphs:attribute_glyph",
     "model": "facade_tools.exteriors.picture:model_picture",
+    "blocks": "facade_tools.stylization.drawing:blocks_scene",
+    "stylesheet": "facade_tools.stylization.drawing:sheet_picture",
     "parse": "facade_tools.imaging.label_views:parse_view",
 }
 

@@ -23,7 +23,20 @@ from ._stream import ItemStage, run_stream, side_input
     show_default=True,
     help="How many different facades a building.",
 )
-def command(stream: StreamOptions, library: str | None, keep: str | None, candidates: int) -> None:
+@click.option(
+    "--design",
+    "designs",
+    metavar="SIDE:DESIGN",
+    multiple=True,
+    help="A design (see layer-solve) for the largest wall of front, back, left or right.",
+)
+def command(
+    stream: StreamOptions,
+    library: str | None,
+    keep: str | None,
+    candidates: int,
+    designs: tuple[str, ...],
+) -> None:
     """Put windows and doors on buildings (FW16 6.2).
 
     BUILDINGS are .json or .jsonl files, folders of them, or - for standard input. Each is made for
@@ -36,10 +49,16 @@ def command(stream: StreamOptions, library: str | None, keep: str | None, candid
     from facade_tools.exteriors.facadegen import FacadeOptions, generate_facades
     from facade_tools.exteriors.library import read_library
 
+    from ._designing import designers
+
     known = None if keep is None else read_one(keep, "building")
     shelf = None if library is None else read_library(library)
-    options = {"options": FacadeOptions(shelf, known, candidates)}
-    sources = side_input(library) + side_input(keep)
-    recorded = {"candidates": candidates}
-    stage = ItemStage("facadegen", ("building",), generate_facades, options, recorded, sources)
+    made = FacadeOptions(shelf, known, candidates, designs=designers(designs))
+    paths = [library, keep, *(pair.partition(":")[2] for pair in designs)]
+    sources = tuple(source for path in paths for source in side_input(path))
+    sides = [pair.partition(":")[0] for pair in designs]
+    recorded = {"candidates": candidates} | ({"design": sides} if designs else {})
+    stage = ItemStage(
+        "facadegen", ("building",), generate_facades, {"options": made}, recorded, sources
+    )
     run_stream(stage, stream)

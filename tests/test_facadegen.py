@@ -299,3 +299,27 @@ def test_pieces_of_the_result_are_those_of_the_mass():
     for side, pieces in facade_pieces(house).items():
         stripped = tuple(replace(p, elements=()) for p in house.facades[side].pieces)
         assert stripped == pieces
+
+
+# --- designs ------------------------------------------------------------------------------------
+
+
+def test_design_takes_the_place_of_the_front_with_its_door(facade, tmp_path):
+    mass = tmp_path / "mass.jsonl"
+    mass.write_bytes(dump_line(encode(bare(sample("colonial")))))
+    design = ROOT / "sample_data" / "designs" / "house-front.yaml"
+    out = tmp_path / "house.jsonl"
+    done = facade("facadegen", mass, "--design", f"front:{design}", "-o", out)
+    assert done.returncode == 0, done.stderr
+    (house,) = read([str(out)], "building")
+    assert list(building_problems(house)) == []
+    front = [e for side, _, e in elements(house) if side == "front"]
+    assert [e.main for e in front if e.kind == "door"] == [True]
+    assert len({round(e.width, 6) for e in front if e.kind == "window" and e.style == "sash"}) >= 1
+    assert {side for side, *_ in elements(house)} == set(SIDES)
+
+
+def test_design_of_no_side_is_refused(facade):
+    done = facade("facadegen", HOUSES / "cape.jsonl", "--design", "roof:x.yaml")
+    assert done.returncode == 3
+    assert b"SIDE:DESIGN" in done.stderr

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ..artifacts.attributes import WINDOW_BITS, Attributes, FacadeAttributes
-from ..artifacts.building import SIDES, Building, Energy, Facade, Piece, Side
+from ..artifacts.building import SIDES, Building, Element, Energy, Facade, Piece, Side
 from ..artifacts.library import LibraryBuilding
 from ..errors import InvalidInput
 from ..geometry.arrays import Floats
 from ..geometry.pieces import facade_pieces
 from .attributes import building_attributes
+from .designed import Designer, designed_pieces
 from .facade_energy import LEAST_TARGET, energy, side_targets, widths
 from .facade_layout import OPEN
 from .facade_layout import Side as SearchSide
@@ -38,13 +39,15 @@ class FacadeOptions:
     """How facades are made.
 
     library: where elements come from; None: the shipped one. keep: a partial building whose listed
-    sides were observed. candidates: how many different buildings to make of each.
+    sides were observed. candidates: how many different buildings to make of each. designs: sides
+    whose largest wall is designed.
     """
 
     library: ElementLibrary | None = None
     keep: Building | None = None
     candidates: int = 1
     search: Search = field(default_factory=Search)
+    designs: Mapping[Side, Designer] = field(default_factory=dict)
 
 
 def generate_facades(
@@ -62,6 +65,7 @@ def generate_facades(
     """
     _refuse_unfinished(building)
     shelf = options.library or default_library()
+    designed = designed_pieces(building, facade_pieces(building), options.designs)
     among = max(SIMILAR, options.candidates)
     for number, own in enumerate(rng.spawn(options.candidates), start=1):
         identity = building.id if options.candidates == 1 else f"{building.id}-{number}"
@@ -69,7 +73,7 @@ def generate_facades(
         wanted = _wanted(building, similar[0])
         if options.keep is not None:
             similar = [shelf.observed(entry, options.keep) for entry in similar]
-        tries = (_Attempt(building, shelf, entry, options, own) for entry in similar)
+        tries = (_Attempt(building, shelf, entry, options, own, designed) for entry in similar)
         yield replace(_first_good(attempt.finished(wanted) for attempt in tries), id=identity)
 
 
@@ -122,6 +126,7 @@ class _Attempt:
     entry: LibraryBuilding
     options: FacadeOptions
     rng: np.random.Generator
+    designed: Mapping[str, tuple[Element, ...]]
 
     def finished(self, wanted: FacadeAttributes) -> tuple[Building, float]:
         """Return the building with facades, colours and energy, and the energy over its bound."""
@@ -149,24 +154,17 @@ class _Attempt:
         """Return the sides with known elements and garage doors."""
         keep, library = self.options.keep, self.shelf.library
         made = facade_pieces(self.building)
-        sides = standing_sides(self.building, made, keep)
+        sides = [
+            _with_elements(side, self.designed)
+            for side in standing_sides(self.building, made, keep)
+        ]
         free = {side.name: side.pieces for side in sides if not side.closed}
         room = {
             name: _area(pieces, ratio) - (name == "front") * MAIN_DOOR_AREA
             for (name, pieces), ratio in zip(made.items(), wanted.wwr, strict=True)
         }
         doors = garage_doors(self.building, free, garage_sizes(library, self.entry), room)
-        return [
-            replace(
-                side,
-                pieces=tuple(
-                    replace(piece, elements=doors.get(piece.id, piece.elements))
-                    for piece in side.pieces
-                ),
-                closed=side.closed | (doors.keys() & {piece.id for piece in side.pieces}),
-            )
-            for side in sides
-        ]
+        return [_with_elements(side, doors) for side in sides]
 
     def _main_doors(
         self,
@@ -196,6 +194,14 @@ class _Attempt:
                 break
         assert best is not None
         return best, main
+
+
+def _with_elements(side: Standing, elements: Mapping[str, tuple[Element, ...]]) -> Standing:
+    """Return a side whose pieces have the elements given by piece id, and take no more."""
+    pieces = tuple(replace(p, elements=elements.get(p.id, p.elements)) for p in side.pieces)
+    return replace(
+        side, pieces=pieces, closed=side.closed | {p.id for p in pieces if p.id in elements}
+    )
 
 
 def _area(pieces: Sequence[Piece], ratio: float | None) -> float:

@@ -6,15 +6,44 @@ import numpy as np
 
 from ..compiled import compiled
 from ..geometry.arrays import Floats, Integers, Rectangles
-from ..geometry.boxes import RESOLUTION, area_perimeter, shared_outline
-from ..geometry.floors import FLOORS, TOLERANCE
+from ..geometry.boxes import RESOLUTION
+from .mass_layout import (
+    ARF,
+    BBOX,
+    BCR,
+    BDRY,
+    FAR,
+    GARAGE,
+    GARAGE_AT,
+    GENERAL,
+    KINDS,
+    MASS_SIZE,
+    PORCH,
+    PORCH_AT,
+    Layout,
+    attributes_of_layout,
+    layout_bounds,
+    new_work,
+)
 
-GENERAL, GARAGE, PORCH = 0, 1, 2
-KINDS = ("general", "garage", "porch")
+__all__ = [
+    "ARF",
+    "BBOX",
+    "BCR",
+    "BDRY",
+    "FAR",
+    "GARAGE",
+    "GARAGE_AT",
+    "GENERAL",
+    "KINDS",
+    "MASS_SIZE",
+    "PORCH",
+    "PORCH_AT",
+    "mass_vector",
+    "plan_edges",
+]
 
-# Places of the groups in the vector of 27.
-BBOX, BCR, BDRY, FAR, ARF, GARAGE_AT, PORCH_AT = 0, 3, 4, 5, 6, 9, 15
-MASS_SIZE = 27
+UNKNOWN_STOREYS = 0.75  # what a box of unknown height counts as: floor 0 and no other
 
 
 @compiled
@@ -30,89 +59,32 @@ def plan_edges(boxes: Floats) -> Rectangles:
 
 
 @compiled
-def floor_mask(boxes: Floats, kinds: Integers, storey_height: float, floor: int) -> Integers:
-    """Return the indices of the boxes of a floor; an unknown height (NaN) reaches floor 0."""
-    chosen = np.empty(len(boxes), dtype=np.int64)
-    count = 0
-    threshold = (floor + 0.5) * storey_height + TOLERANCE
+def _part_of(box: Floats, kind: int, middle: float) -> int:
+    """Return 0 for a garage, 1 for a front porch, 2 for a back porch, -1 otherwise."""
+    if kind == PORCH:
+        return 2 if box[1] >= middle else 1
+    return 0 if kind == GARAGE else -1
+
+
+@compiled
+def _as_given(boxes: Floats, kinds: Integers, bounds: Floats, out: Floats) -> None:
+    """Write place and size of the largest garage and porches from their given numbers.
+
+    The grid has rounded them to 1e-6 m.
+    """
+    middle = (bounds[1] + bounds[3]) / 2
+    largest = np.zeros(3)
     for k in range(len(boxes)):
-        height = boxes[k, 4]
-        if kinds[k] != PORCH and (height > threshold or (floor == 0 and np.isnan(height))):
-            chosen[count] = k
-            count += 1
-    return chosen[:count]
-
-
-@compiled
-def bounding(edges: Rectangles, chosen: Integers) -> Floats:
-    """Return the bounding rectangle of chosen rectangles; there must be one at least."""
-    bounds: Floats = edges[chosen[0]].copy()
-    for k in chosen:
-        for axis in range(2):
-            bounds[axis] = min(bounds[axis], edges[k, axis])
-            bounds[2 + axis] = max(bounds[2 + axis], edges[k, 2 + axis])
-    return bounds
-
-
-@compiled
-def _describe(box: Floats, bounds: Floats, exposed: float, out: Floats) -> None:
-    """Write centre relative to `bounds`, size and exposure of a garage or porch."""
-    out[0] = (box[0] - bounds[0]) / (bounds[2] - bounds[0])
-    out[1] = (box[1] - bounds[1]) / (bounds[3] - bounds[1])
-    out[2], out[3], out[4] = box[2], box[3], box[4]
-    out[5] = min(exposed / (2 * (box[2] + box[3])), 1.0)
-
-
-@compiled
-def _largest(boxes: Floats, kinds: Integers, kind: int, middle: float, part: int) -> int:
-    """Return the largest box of a kind, -1 if none; part 0 before, 1 behind the middle, 2 any."""
-    best, size = -1, -1.0
-    for k in range(len(boxes)):
-        behind = 0 if boxes[k, 1] < middle else 1
-        area = boxes[k, 2] * boxes[k, 3]
-        if kinds[k] == kind and part in (2, behind) and area > size:
-            best, size = k, area
-    return best
-
-
-@compiled
-def _floor_values(
-    boxes: Floats, kinds: Integers, edges: Rectangles, storey_height: float, out: Floats
-) -> None:
-    ground = floor_mask(boxes, kinds, storey_height, 0)
-    bounds = bounding(edges, ground)
-    base = (bounds[2] - bounds[0]) * (bounds[3] - bounds[1])
-    area, perimeter = area_perimeter(edges[ground])
-    out[BCR] = min(area / base, 1.0)
-    out[BDRY] = perimeter / np.sqrt(area)
-    out[ARF] = area
-    for floor in range(1, FLOORS):
-        upper = floor_mask(boxes, kinds, storey_height, floor)
-        out[ARF + floor] = area if len(upper) == len(ground) else area_perimeter(edges[upper])[0]
-    total = out[ARF] + out[ARF + 1] + out[ARF + 2]
-    out[FAR] = min(total / base, 1.0 * FLOORS)
-    for floor in range(FLOORS):
-        out[ARF + floor] /= total
-
-
-@compiled
-def _parts(
-    boxes: Floats, kinds: Integers, edges: Rectangles, ground: Integers, out: Floats
-) -> None:
-    bounds = bounding(edges, ground)
-    garage = _largest(boxes, kinds, GARAGE, 0.0, 2)
-    if garage >= 0:
-        exposed = shared_outline(edges[garage], edges[ground])
-        _describe(boxes[garage], bounds, exposed, out[GARAGE_AT : GARAGE_AT + 6])
-    for part in range(2):
-        porch = _largest(boxes, kinds, PORCH, (bounds[1] + bounds[3]) / 2, part)
-        if porch >= 0:
-            around = np.empty((len(ground) + 1, 4))
-            around[:-1] = edges[ground]
-            around[-1] = edges[porch]
-            exposed = shared_outline(edges[porch], around)
-            start = PORCH_AT + 6 * part
-            _describe(boxes[porch], bounds, exposed, out[start : start + 6])
+        part = _part_of(boxes[k], kinds[k], middle)
+        size = boxes[k, 2] * boxes[k, 3]
+        if part >= 0 and size > largest[part]:
+            largest[part] = size
+            start = GARAGE_AT + 6 * part
+            for axis in range(2):
+                span = bounds[2 + axis] - bounds[axis]
+                out[start + axis] = (boxes[k, axis] - bounds[axis]) / span
+            for column in range(2, 5):
+                out[start + column] = boxes[k, column]
 
 
 @compiled
@@ -123,19 +95,22 @@ def mass_vector(boxes: Floats, kinds: Integers, storey_height: float) -> Floats:
     indices into KINDS. All NaN without a box that reaches floor 0; all six 0 where there is no
     garage or porch. Largest garage or porch in plan, ties by order.
     """
-    ground = floor_mask(boxes, kinds, storey_height, 0)
-    if len(ground) == 0:
-        return np.full(MASS_SIZE, np.nan)
-    edges = plan_edges(boxes)
-    out = np.zeros(MASS_SIZE)
-    mass = np.flatnonzero(kinds != PORCH)
-    bounds = bounding(edges, mass)
-    out[0] = bounds[2] - bounds[0]
-    out[1] = bounds[3] - bounds[1]
-    for k in mass:
-        out[2] = boxes[k, 4] if np.isnan(boxes[k, 4]) else max(out[2], boxes[k, 4])
-        if np.isnan(out[2]):
-            break
-    _floor_values(boxes, kinds, edges, storey_height, out)
-    _parts(boxes, kinds, edges, ground, out)
-    return out
+    n = len(boxes)
+    rows = np.empty((n, 5))
+    rows[:, :4] = plan_edges(boxes)
+    unknown = False
+    for k in range(n):
+        rows[k, 4] = boxes[k, 4]
+        if np.isnan(boxes[k, 4]):
+            rows[k, 4] = UNKNOWN_STOREYS * storey_height
+            unknown = unknown or kinds[k] != PORCH
+    work = new_work(n)
+    layout = Layout(rows, kinds, np.zeros(n, dtype=np.int64))
+    if not attributes_of_layout(layout, storey_height, work):
+        work.values[:] = np.nan
+        return work.values
+    bounds, _ = layout_bounds(layout, storey_height, True)
+    _as_given(boxes, kinds, bounds, work.values)
+    if unknown:
+        work.values[2] = np.nan
+    return work.values

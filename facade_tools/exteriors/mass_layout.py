@@ -1,7 +1,7 @@
-"""The inner loop of mass generation: a layout of boxes and its attributes, without allocation.
+"""The kernel below attributes and mass generation: boxes on a compressed grid, in fixed arrays.
 
-Gives the same 27 numbers as `mass_attributes.mass_vector` (which the tests compare it with), and
-the two geometric terms of FW16 eq. 3, for layouts that live in fixed arrays.
+`facade attributes` and the energy of `massgen` share it, so that their numbers agree. It also
+gives the two geometric terms of FW16 eq. 3.
 """
 
 from __future__ import annotations
@@ -13,17 +13,13 @@ import numpy as np
 from ..compiled import compiled
 from ..geometry.arrays import Floats, Integers
 from ..geometry.floors import FLOORS, TOLERANCE
-from .mass_attributes import (
-    ARF,
-    BCR,
-    BDRY,
-    FAR,
-    GARAGE,
-    GARAGE_AT,
-    MASS_SIZE,
-    PORCH,
-    PORCH_AT,
-)
+
+GENERAL, GARAGE, PORCH = 0, 1, 2
+KINDS = ("general", "garage", "porch")
+
+# Places of the groups in the vector of 27.
+BBOX, BCR, BDRY, FAR, ARF, GARAGE_AT, PORCH_AT = 0, 3, 4, 5, 6, 9, 15
+MASS_SIZE = 27
 
 CAPACITY = 24  # boxes of a layout
 EMPTY = -1  # kind of an unused row
@@ -33,7 +29,7 @@ LEAST_THICKNESS = 0.5  # t_min of FW16 (m)
 
 
 class Layout(NamedTuple):
-    """Boxes as rows x0, y0, x1, y1, height (CAPACITY, 5), their kinds, and what is locked."""
+    """Boxes as rows x0, y0, x1, y1, height (n, 5), their kinds (EMPTY: unused), what is locked."""
 
     rows: Floats
     kinds: Integers
@@ -57,13 +53,14 @@ def new_layout() -> Layout:
     return Layout(np.zeros((CAPACITY, 5)), kinds, np.zeros(CAPACITY, dtype=np.int64))
 
 
-def new_work() -> Work:
-    """Return scratch arrays for one thread."""
-    lines = 2 * CAPACITY
+@compiled
+def new_work(capacity: int = CAPACITY) -> Work:
+    """Return scratch arrays for layouts of up to `capacity` boxes."""
+    lines = 2 * capacity
     return Work(
         np.zeros(lines),
         np.zeros(lines),
-        np.zeros((CAPACITY, 4), dtype=np.int64),
+        np.zeros((capacity, 4), dtype=np.int64),
         np.zeros((lines + 1, lines + 1), dtype=np.int64),
         np.zeros(2, dtype=np.int64),
         np.zeros(MASS_SIZE),
@@ -111,7 +108,7 @@ def _level(height: float, storey_height: float) -> int:
 def _build_grid(layout: Layout, storey_height: float, work: Work) -> None:
     n = 0
     m = 0
-    for k in range(CAPACITY):
+    for k in range(len(layout.kinds)):
         if layout.kinds[k] != EMPTY:
             n = _insert(work.xs, _insert(work.xs, n, layout.rows[k, 0]), layout.rows[k, 2])
             m = _insert(work.ys, _insert(work.ys, m, layout.rows[k, 1]), layout.rows[k, 3])
@@ -119,7 +116,7 @@ def _build_grid(layout: Layout, storey_height: float, work: Work) -> None:
     for i in range(n + 1):
         for j in range(m + 1):
             work.levels[i, j] = 0
-    for k in range(CAPACITY):
+    for k in range(len(layout.kinds)):
         kind = layout.kinds[k]
         if kind == EMPTY:
             continue
@@ -172,11 +169,11 @@ def _exposed(k: int, work: Work, porch: bool) -> float:
 
 
 @compiled
-def _bounds(layout: Layout, storey_height: float, ground: bool) -> tuple[Floats, float]:
+def layout_bounds(layout: Layout, storey_height: float, ground: bool) -> tuple[Floats, float]:
     """Return the plan bounds of the mass (of floor 0 where `ground`) and its greatest height."""
     bounds = np.array([np.inf, np.inf, -np.inf, -np.inf])
     height = 0.0
-    for k in range(CAPACITY):
+    for k in range(len(layout.kinds)):
         if layout.kinds[k] == EMPTY or layout.kinds[k] == PORCH:
             continue
         if ground and _level(layout.rows[k, 4], storey_height) == 0:
@@ -201,7 +198,7 @@ def _write_part(layout: Layout, k: int, bounds: Floats, exposed: float, out: Flo
 def _parts(layout: Layout, bounds: Floats, work: Work) -> None:
     middle = (bounds[1] + bounds[3]) / 2
     sizes = np.zeros(3)
-    for k in range(CAPACITY):
+    for k in range(len(layout.kinds)):
         kind = layout.kinds[k]
         if kind != GARAGE and kind != PORCH:
             continue
@@ -221,8 +218,8 @@ def attributes_of_layout(layout: Layout, storey_height: float, work: Work) -> bo
     out = work.values
     out[:] = 0.0
     _build_grid(layout, storey_height, work)
-    whole, height = _bounds(layout, storey_height, False)
-    ground, _ = _bounds(layout, storey_height, True)
+    whole, height = layout_bounds(layout, storey_height, False)
+    ground, _ = layout_bounds(layout, storey_height, True)
     if ground[0] >= ground[2]:
         return False
     out[0], out[1], out[2] = whole[2] - whole[0], whole[3] - whole[1], height
@@ -242,8 +239,8 @@ def attributes_of_layout(layout: Layout, storey_height: float, work: Work) -> bo
 @compiled
 def move_to_origin(layout: Layout) -> None:
     """Move all boxes so that the mass starts at x = 0, y = 0."""
-    bounds, _ = _bounds(layout, 0.0, False)
-    for k in range(CAPACITY):
+    bounds, _ = layout_bounds(layout, 0.0, False)
+    for k in range(len(layout.kinds)):
         for axis in range(2):
             layout.rows[k, axis] -= bounds[axis]
             layout.rows[k, 2 + axis] -= bounds[axis]
@@ -252,19 +249,19 @@ def move_to_origin(layout: Layout) -> None:
 @compiled
 def connected(layout: Layout) -> bool:
     """Tell whether all boxes hang together: they share 0.5 m of edge, or overlap by that."""
-    reached = np.zeros(CAPACITY, dtype=np.int64)
+    reached = np.zeros(len(layout.kinds), dtype=np.int64)
     todo = 0
-    for k in range(CAPACITY):
+    for k in range(len(layout.kinds)):
         if layout.kinds[k] != EMPTY:
             reached[k] = 1 if todo == 0 else 0
             todo += 1
     grown = True
     while grown:
         grown = False
-        for k in range(CAPACITY):
+        for k in range(len(layout.kinds)):
             if layout.kinds[k] == EMPTY or reached[k]:
                 continue
-            for j in range(CAPACITY):
+            for j in range(len(layout.kinds)):
                 if reached[j] and in_contact(layout.rows[k], layout.rows[j]):
                     reached[k] = 1
                     grown = True

@@ -24,6 +24,7 @@ from ._stream import file_name, is_folder
 SCENES = {
     "building": "facade_tools.geometry.details:building_scene",
     "footprint": "facade_tools.geometry.details:footprint_scene",
+    "parse": "facade_tools.grammar.relief:parse_scene",
     "layout": "facade_tools.layering.scene:layout_scene",
 }
 # Kind of artifact -> function that makes a CityModel of it.

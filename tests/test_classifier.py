@@ -219,7 +219,7 @@ def test_the_shipped_classifier_reads_rendered_facades():
     pair = rendered(77, 160, 288)
     belief = classifier.probabilities(classifier.working(pair.picture))
     found = np.array([LABELS.index(name) for name in classifier.classes])[belief.argmax(axis=0)]
-    assert (found == pair.labels)[pair.labels > 0].mean() > 0.8
+    assert (found == pair.labels)[pair.labels > 0].mean() > 0.7
 
 
 @pytest.mark.parametrize("name", list(CONVENTIONS))

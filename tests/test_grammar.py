@@ -221,3 +221,24 @@ def test_the_sample_grammar_file_works(facade, tmp_path):
     path = Path(__file__).resolve().parent.parent / "sample_data" / "grammars" / "row-house.yaml"
     grammar = read_one(str(path), "grammar")
     assert plan(replace(grammar, title="")).labels
+
+
+def test_a_parse_becomes_a_closed_slab_with_parts_in_relief(facade, tmp_path):
+    from facade_tools.grammar.relief import metres_per_pixel, parse_scene
+
+    out = tmp_path / "facade.json"
+    assert facade("sample-grammar", "haussmann", "-o", out).returncode == 0
+    parse = read_one(str(out), "parse")
+    scene = parse_scene(parse)
+    for mesh in scene.meshes:
+        a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+        volume = np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6
+        assert volume > 0
+        assert np.ptp(mesh.vertices, axis=0).min() > 0
+    names = [mesh.name for mesh in scene.meshes]
+    assert names[0] == "mass"
+    assert len(set(names)) == len(names)
+    gaps = np.diff(sorted({floor.y1 for floor in parse.floors}))
+    assert np.median(gaps) * metres_per_pixel(parse) == pytest.approx(3.0)
+    assert facade("view", out, "-o", tmp_path / "facade.png").returncode == 0
+    assert facade("export", out, "-o", tmp_path / "facade.glb").returncode == 0

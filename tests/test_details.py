@@ -8,6 +8,7 @@ from dataclasses import replace
 import catalogue
 import numpy as np
 import pytest
+import shapely
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -15,6 +16,7 @@ from hypothesis import strategies as st
 from facade_tools.artifacts.building import Box, Building, Chimney, Element, Facade, Piece, Roof
 from facade_tools.errors import InvalidInput
 from facade_tools.geometry.detail_boxes import box_triangles, side_frame
+from facade_tools.geometry.detail_cladding import wall_pattern
 from facade_tools.geometry.detail_roofs import THICKNESS, roof_slabs
 from facade_tools.geometry.detail_volumes import porch, prism
 from facade_tools.geometry.details import (
@@ -163,8 +165,6 @@ def test_slab_covers_the_roof_and_reaches_over_the_walls(plan, style):
 
 
 def catalogue_area(building):
-    import shapely
-
     plans = [
         shapely.box(b.x - b.width / 2, b.y - b.depth / 2, b.x + b.width / 2, b.y + b.depth / 2)
         for b in building.boxes
@@ -216,6 +216,29 @@ def test_an_element_of_any_size_is_made_of_outward_closed_parts(kind, style, wid
             assert signed_volume(mesh) > 0.0
 
 
+def test_boards_stand_on_the_outer_corners_only():
+    building = catalogue.plan_building("L", Roof("hip", 30.0))
+    boards = next(m for m in building_scene(building).meshes if m.name == "corner-boards")
+    assert len(boards.vertices) == 5 * 8  # an L has five outer corners and one inner
+    assert boards.vertices[:, 2].max() == pytest.approx(6.0)
+    outline = shapely.unary_union([shapely.box(*r) for r in catalogue.rectangles("L")])
+    far = [outline.exterior.distance(shapely.Point(x, y)) for x, y, _ in boards.vertices]
+    assert max(far) < 0.2
+
+
+@pytest.mark.parametrize(
+    ("color", "style", "pattern"),
+    [
+        ("#b5543f", "gable", "brick"),
+        ("#d9d3c3", "gable", "siding"),
+        ("#d9d3c3", "flat", ""),
+        ("#b5543f", "flat", "brick"),
+    ],
+)
+def test_walls_are_made_of_what_their_colour_and_roof_say(color, style, pattern):
+    assert wall_pattern(house(roof=Roof(style, 30.0)), color) == pattern
+
+
 def test_an_unknown_height_is_sketched_but_not_exported():
     box = Box("main", "general", 0.0, 0.0, 6.0, 6.0)
     building = Building("part", (box,), storey_height=2.5, partial=True)
@@ -227,7 +250,7 @@ def test_an_unknown_height_is_sketched_but_not_exported():
 def test_partial_building_without_facades_and_roof_is_drawn():
     box = Box("main", "general", 0.0, 0.0, 6.0, 6.0, 3.0)
     scene = building_scene(Building("part", (box,), partial=True))
-    assert {mesh.name for mesh in scene.meshes} == {"mass", "cladding", "roof"}
+    assert {mesh.name for mesh in scene.meshes} == {"mass", "cladding", "corner-boards", "roof"}
 
 
 @pytest.mark.parametrize("name", ["victorian", "bungalow"])

@@ -12,7 +12,7 @@ import numpy as np
 from ..artifacts.building import SIDES, Building, Colors, Piece, Side
 from ..artifacts.footprint import Footprint
 from .detail_boxes import Box6, LocalFrame, meshes_of, side_frame
-from .detail_cladding import cladding, wall_pattern
+from .detail_cladding import cladding, corner_boards, wall_pattern
 from .detail_doors import door_parts, garage_door_parts
 from .detail_roofs import roof_slabs
 from .detail_volumes import bay_window, chimney, porch
@@ -26,6 +26,9 @@ PALETTE = (
     Colors("#c9b79c", "#fbf8f0", "#6b4a3a", "#36523f"),
     Colors("#b5543f", "#f1ebdf", "#4d4f55", "#22313f"),
     Colors("#e9e6df", "#ffffff", "#5d5f66", "#8c3b2e"),
+    Colors("#8d9b7f", "#f3efe2", "#574a42", "#5b2f22"),
+    Colors("#dcc48e", "#fffaf0", "#5a5148", "#274b45"),
+    Colors("#7d8ea3", "#f2f4f5", "#3f4247", "#a8702a"),
 )
 PLINTH = 0.22  # height of the foundation that shows, metres
 
@@ -37,9 +40,14 @@ def building_scene(building: Building) -> Scene:
     """
     solid = building_solid(building)
     overhang = {box.id: box.roof.overhang for box in building.boxes if box.roof is not None}
-    colors = building.colors or PALETTE[0]
+    colors = building.colors or _own_colors(building.id)
     pattern = wall_pattern(building, colors.wall)
-    meshes = [mass_mesh(solid), *cladding(solid, pattern), *roof_slabs(solid, overhang)]
+    meshes = [
+        mass_mesh(solid),
+        *cladding(solid, pattern),
+        *corner_boards(solid, pattern),
+        *roof_slabs(solid, overhang),
+    ]
     for side in SIDES:
         if side in building.facades:
             for index, piece in enumerate(building.facades[side].pieces, 1):
@@ -65,9 +73,12 @@ def footprint_scene(footprint: Footprint) -> Scene:
     solid = footprint_solid(footprint)
     overhang = 0.0 if footprint.roof is None else footprint.roof.overhang
     meshes = (mass_mesh(solid), *roof_slabs(solid, {"": overhang}))
-    # A footprint knows no colours: its name picks some, so that a street is not all alike.
-    colors = PALETTE[zlib.crc32(footprint.id.encode()) % len(PALETTE)]
-    return Scene(footprint.id, meshes, materials(colors, ""))
+    return Scene(footprint.id, meshes, materials(_own_colors(footprint.id), ""))
+
+
+def _own_colors(identity: str) -> Colors:
+    """Return colours for what knows none: its name picks them, so that streets are mixed."""
+    return PALETTE[zlib.crc32(identity.encode()) % len(PALETTE)]
 
 
 def mass_mesh(solid: Solid) -> Mesh:

@@ -1,4 +1,4 @@
-"""Rates of every reader (a second of CPU), the memory of a stream, and what became of each real set.
+"""Rates of every reader (by CPU time), the memory of a stream, what became of each real set.
 
     python benchmarks/bench_import.py [--data FOLDER] [--stream 20000]
 

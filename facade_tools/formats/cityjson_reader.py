@@ -228,7 +228,7 @@ def _model(
         return _checked_model(root, members, frame, vertices)
     except InvalidInput as error:
         return error
-    except (TypeError, ValueError, IndexError, KeyError, AttributeError) as error:
+    except (TypeError, ValueError, LookupError, AttributeError, RecursionError) as error:
         text = f"broken geometry ({type(error).__name__}: {error})"
         return InvalidInput(text, pointer=f"/CityObjects/{root}")
 

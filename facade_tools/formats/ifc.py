@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -18,7 +18,7 @@ from .reading import BY_NAME, Built, ReadOptions, Record, read_whole
 from .surfaces import Meaning, Model, Surface
 
 WALLS = ("IfcWall", "IfcCurtainWall")
-ROOFS = ("IfcRoof", "IfcSlab", "IfcCovering")
+ROOFS = ("IfcRoof", "IfcSlab")
 OPENINGS: tuple[tuple[str, Meaning], ...] = (("IfcWindow", "window"), ("IfcDoor", "door"))
 CLOSING = 0.6  # metres: gaps of the plan of the walls that are closed (doors, thick joints)
 LEAST_STEP = 0.3  # metres a roof's surface rises over the walls' middle to count as roof
@@ -89,9 +89,7 @@ def _triangles(opened: Any, kinds: tuple[str, ...]) -> list[Shape]:
     settings.set("use-world-coords", True)
     found: list[Shape] = []
     total = 0
-    for element in (e for kind in kinds for e in opened.by_type(kind)):
-        if element.Representation is None:
-            continue
+    for element in _with_bodies(e for kind in kinds for e in opened.by_type(kind)):
         try:
             geometry = ifcopenshell.geom.create_shape(settings, element).geometry
         except RuntimeError:  # ifcopenshell's word for an element whose geometry it cannot make
@@ -104,6 +102,18 @@ def _triangles(opened: Any, kinds: tuple[str, ...]) -> list[Shape]:
         if len(faces):
             found.append((points, faces))
     return found
+
+
+def _with_bodies(elements: Iterable[Any]) -> Iterator[Any]:
+    """Yield the elements that have geometry: themselves, or else the parts they consist of."""
+    seen: set[int] = set()
+    for element in elements:
+        parts = [p for relation in element.IsDecomposedBy for p in relation.RelatedObjects]
+        found = [element] if element.Representation is not None else _with_bodies(parts)
+        for body in found:
+            if body.id() not in seen:
+                seen.add(body.id())
+                yield body
 
 
 def _outline(walls: list[Shape]) -> BaseGeometry:

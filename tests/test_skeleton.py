@@ -23,7 +23,7 @@ from facade_tools.geometry.skeleton import (
 )
 
 POLYGONS = catalogue.polygons()
-EVERY_PATH = range(8)
+EVERY_PATH = range(10)
 
 
 def check(rings: Rings, skeleton: Skeleton, speeds: np.ndarray | None = None) -> None:
@@ -194,3 +194,15 @@ def test_fast_edge_sweeps_around_a_slow_hole() -> None:
     shapes += [shapely.Polygon(skeleton.points[face]) for face in skeleton.faces[1:]]
     assert sum(shape.area for shape in shapes) == pytest.approx(40 * 30 - 1, rel=1e-6)
     assert shapely.union_all(shapes, grid_size=1e-9).area == pytest.approx(1199, rel=1e-6)
+
+
+@pytest.mark.parametrize("noise", [1e-4, 1e-6, 1e-7, 1e-8, 1e-9, 1e-12])
+def test_nearly_parallel_and_nearly_simultaneous(noise: float) -> None:
+    rng = np.random.default_rng(13)
+    for k in range(40):
+        turn = rng.uniform(0, 2 * np.pi)
+        frame = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+        rings = oriented(catalogue.random_polygon(rng, ("cells", "boxes")[k % 2]))
+        rings = [(ring + rng.normal(0, noise, ring.shape)) @ frame for ring in rings]
+        if shapely.Polygon(rings[0], rings[1:]).is_valid:
+            straight_skeleton(rings)

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import catalogue
 import numpy as np
 import pytest
+import shapely
 import trimesh
 
 from facade_tools.artifacts.building import Box, Building, Roof
+from facade_tools.artifacts.footprint import Footprint
 from facade_tools.errors import InvalidInput
-from facade_tools.geometry.solids import Solid, building_solid, triangulated
+from facade_tools.geometry.polygons import oriented
+from facade_tools.geometry.solids import Solid, building_solid, footprint_solid, triangulated
+from facade_tools.geometry.triangulate import triangulate_rings
+from facade_tools.geometry.triangulate_ears import clipped_ears
 
 BUILDINGS = catalogue.buildings()
 
@@ -67,3 +74,37 @@ def test_no_box_is_invalid() -> None:
     porch = catalogue.box("p", (0, 0, 4, 3), 3, kind="porch")
     with pytest.raises(InvalidInput, match="no general or garage box"):
         building_solid(Building("b", (porch,)))
+
+
+@pytest.mark.parametrize("kind", catalogue.POLYGON_KINDS)
+def test_triangles_cover_the_polygon_and_pair(kind: str) -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(60):
+        rings = [np.array(ring) for ring in catalogue.random_polygon(rng, kind)]
+        check_triangles(rings, triangulate_rings(rings))
+        order = oriented(rings)
+        ends = np.cumsum([len(ring) for ring in rings])
+        check_triangles(order, clipped_ears(np.concatenate(order), ends))
+
+
+def check_triangles(rings: list[np.ndarray], triangles: np.ndarray) -> None:
+    points = np.concatenate(rings)
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    areas = ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2
+    assert areas.sum() == pytest.approx(shapely.Polygon(rings[0], rings[1:]).area)
+    assert areas.min() >= -1e-9
+    sides = Counter((t[k - 1], t[k]) for t in triangles.tolist() for k in range(3))
+    assert max(sides.values()) == 1
+    assert sum(side[::-1] not in sides for side in sides) == len(points)
+
+
+def test_points_in_one_line_are_kept() -> None:
+    ring = np.array([[0, 0], [1, 0], [2, 0], [3, 0], [3, 1], [0, 1], [0, 0.5]], dtype=np.float64)
+    assert len(triangulate_rings([ring])) == 5
+
+
+def test_hole_that_touches_the_outline_is_closed() -> None:
+    rings = (((0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (0.0, 8.0)), ((0.0, 4.0), (3.0, 3.0), (3.0, 5.0)))
+    for style in catalogue.ROOF_STYLES:
+        footprint = Footprint("f", rings, 5.0, catalogue.roofed(style))
+        assert as_mesh(footprint_solid(footprint)).is_volume, style

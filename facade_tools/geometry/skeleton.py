@@ -14,6 +14,7 @@ from .arrays import Floats, Points2
 from .polygons import Rings
 from .skeleton_check import fault
 from .skeleton_faces import faces_of
+from .skeleton_polish import polished
 from .skeleton_shape import Contour, Skeleton
 from .wavefront import DONE, Edges, Front, propagate, traced, wavefront
 
@@ -28,7 +29,11 @@ class SkeletonFailed(FacadeError):
 
 @dataclass(frozen=True, slots=True)
 class _Path:
-    """One way to compute: tolerance and displacement relative to the polygon's size; degrees."""
+    """One way to compute.
+
+    near: what counts as one place, relative to the polygon's size, and as parallel (sine).
+    turn: of the polygon before (degrees). displacement: of its edges, relative to its size.
+    """
 
     near: float
     turn: float = 0.0
@@ -37,11 +42,13 @@ class _Path:
 
 _PATHS = (
     _Path(1e-9),
-    _Path(1e-11),
+    _Path(5e-8),
     _Path(1e-8),
-    _Path(1e-9, turn=17.3),
-    _Path(1e-11, turn=51.7, displacement=1e-9),
+    _Path(2e-7),
+    _Path(1e-11),
+    _Path(5e-8, turn=17.3),
     _Path(1e-11, displacement=3e-9),
+    _Path(1e-6, turn=51.7),
     _Path(1e-12, turn=33.1, displacement=3e-9),
     _Path(1e-11, turn=71.9, displacement=1e-8),
 )
@@ -57,7 +64,8 @@ def straight_skeleton(rings: Rings, speeds: Sequence[float] | Floats | None = No
 
     Every result is verified (faces tile the polygon, one an edge, every node on the planes of
     its faces); one that fails is computed again with other tolerances, turned, and with its
-    edges displaced by at most 1e-8 of its size. Raises SkeletonFailed when none passes.
+    edges displaced by at most 1e-8 of its size; nodes are then put back on their planes. Raises
+    SkeletonFailed when none passes.
     """
     contour = Contour.of(rings, speeds)
     for path in range(len(_PATHS)):
@@ -87,6 +95,7 @@ def skeleton_by(contour: Contour, number: int) -> tuple[Skeleton | None, str]:
     count = len(contour.points)
     faces = tuple(ring for _, ring in rings[:count])
     skeleton = Skeleton(points, times, faces, tuple(rings[count:]))
+    skeleton = polished(skeleton, contour)
     return skeleton, fault(skeleton, contour)
 
 

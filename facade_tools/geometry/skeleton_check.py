@@ -22,7 +22,7 @@ def fault(skeleton: Skeleton, contour: Contour) -> str:
         return "a node below the eaves"
     if plane_error(skeleton, contour) > TOLERANCE:
         return "a node off the planes of its faces"
-    edges, rings = _rings(skeleton)
+    edges, rings = skeleton.rings()
     ends = np.cumsum([len(ring) for ring in rings])
     flat = np.concatenate(rings)
     areas = _ring_areas(skeleton.points, flat, ends)
@@ -40,19 +40,13 @@ def fault(skeleton: Skeleton, contour: Contour) -> str:
     return ""
 
 
-def _rings(skeleton: Skeleton) -> tuple[Integers, list[Integers]]:
-    """Return the edge of every ring of the faces, and the rings."""
-    edges = [*range(len(skeleton.faces)), *(edge for edge, _ in skeleton.holes)]
-    return np.array(edges), [*skeleton.faces, *(ring for _, ring in skeleton.holes)]
-
-
 def plane_error(skeleton: Skeleton, contour: Contour) -> float:
     """Return the largest difference (m) between a node's time and that of an edge it belongs to.
 
     For an edge of speed w: |distance to its line − w · time|.
     """
     _, normal, _ = contour.frames()
-    edges, rings = _rings(skeleton)
+    edges, rings = skeleton.rings()
     edge = np.repeat(edges, [len(ring) for ring in rings])
     node = np.concatenate(rings)
     distance = np.sum(normal[edge] * (skeleton.points[node] - contour.points[edge]), axis=1)

@@ -33,6 +33,11 @@ class Skeleton:
         rings = [self.faces[edge], *(ring for k, ring in self.holes if k == edge)]
         return [self.points[ring] for ring in rings]
 
+    def rings(self) -> tuple[Integers, list[Integers]]:
+        """Return the edge of every ring of the faces, and the rings."""
+        edges = [*range(len(self.faces)), *(edge for edge, _ in self.holes)]
+        return np.array(edges), [*self.faces, *(ring for _, ring in self.holes)]
+
 
 @dataclass(frozen=True, slots=True)
 class Contour:

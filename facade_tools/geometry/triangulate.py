@@ -6,8 +6,11 @@ from collections.abc import Sequence
 
 import mapbox_earcut
 import numpy as np
+from numpy.typing import NDArray
 
 from .arrays import Floats, Integers, Points2, Points3, Triangles
+from .polygons import signed_area
+from .triangulate_ears import clipped_ears
 
 
 def newell_normal(points: Points3) -> Floats:
@@ -28,21 +31,39 @@ def flattened(points: Points3, normal: Floats) -> Points2:
 def triangulate_rings(rings: Sequence[Points2]) -> Triangles:
     """Return triangles (m, 3), counter-clockwise, over the concatenated points of the rings.
 
-    rings: an outer ring, then holes, none closed. No point is added and every edge of a ring
-    is an edge of exactly one triangle, also where points lie in one line (earcut alone drops
-    such points). Points at one place, where rings touch, are taken as one.
+    rings: an outer ring, then holes, none closed. No point is added and every edge of a ring is
+    an edge of exactly one triangle, also where points lie in one line (earcut alone drops such
+    points). Points at one place, where rings touch, are taken as one.
     """
     points = np.ascontiguousarray(np.concatenate(rings), dtype=np.float64)
     ends = np.cumsum([len(ring) for ring in rings]).astype(np.uint32)
     points = points - points.min(axis=0)
     found = np.asarray(mapbox_earcut.triangulate_float64(points, ends), dtype=np.int64)
     triangles = found.reshape(-1, 3)
-    if len(triangles) != len(points) + 2 * len(rings) - 4:
-        triangles = _conforming(points, _without_copies(points, triangles))
+    if len(triangles) != len(points) + 2 * len(rings) - 4 or not _covers(points, ends, triangles):
+        order = _counter_clockwise(points, ends)
+        ears = clipped_ears(points[order], ends.astype(np.int64))
+        return _without_copies(points, order[ears])
     a, b, c = (points[triangles[:, k]] for k in range(3))
     turned = _cross(b - a, c - a) < 0
     triangles[turned] = triangles[turned][:, ::-1]
     return triangles
+
+
+def _counter_clockwise(points: Points2, ends: NDArray[np.uint32]) -> Integers:
+    """Return the points' indices, the outer ring counter-clockwise and the holes clockwise."""
+    rings = np.split(np.arange(len(points)), ends[:-1])
+    right = [(signed_area(points[ring]) > 0) == (k == 0) for k, ring in enumerate(rings)]
+    return np.concatenate([r if good else r[::-1] for r, good in zip(rings, right, strict=True)])
+
+
+def _covers(points: Points2, ends: NDArray[np.uint32], triangles: Triangles) -> bool:
+    """Whether the triangles have the area of the rings, and none is empty."""
+    rings = np.split(points, ends[:-1])
+    whole = abs(signed_area(rings[0])) - sum(abs(signed_area(ring)) for ring in rings[1:])
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    areas = np.abs(_cross(b - a, c - a)) / 2
+    return bool(areas.min(initial=np.inf) > 0 and abs(areas.sum() - whole) <= 1e-9 * abs(whole))
 
 
 def _without_copies(points: Points2, triangles: Triangles) -> Triangles:
@@ -55,43 +76,6 @@ def _without_copies(points: Points2, triangles: Triangles) -> Triangles:
 
 def _cross(a: Points2, b: Points2) -> Floats:
     return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
-
-
-def _conforming(points: Points2, triangles: Triangles) -> Triangles:
-    """Split triangles at the points on their edges; the halves cover what flat ones did."""
-    a, b, c = (points[triangles[:, k]] for k in range(3))
-    reach = np.maximum(((b - a) ** 2).sum(axis=1), ((c - a) ** 2).sum(axis=1))
-    flat = np.abs(_cross(b - a, c - a)) <= 1e-9 * reach
-    _, first = np.unique(points, axis=0, return_index=True)
-    pending = [tuple(row) for row in triangles[~flat].tolist()]
-    done = []
-    while pending:
-        triangle = pending.pop()
-        halves = _split(points, triangle, first)
-        if halves:
-            pending += halves
-        else:
-            done.append(triangle)
-    return np.array(done, dtype=np.int64).reshape(-1, 3)
-
-
-def _split(
-    points: Points2, triangle: tuple[int, ...], candidates: Integers
-) -> list[tuple[int, ...]]:
-    """Return the two halves of a triangle at the first candidate inside one of its edges."""
-    for k in range(3):
-        a, b, c = triangle[k], triangle[(k + 1) % 3], triangle[(k + 2) % 3]
-        edge = points[b] - points[a]
-        length = float(edge @ edge)
-        offset = points[candidates] - points[a]
-        along = offset @ edge / length
-        aside = np.abs(offset[:, 0] * edge[1] - offset[:, 1] * edge[0])
-        inside = (along > 0) & (along < 1) & (aside <= 1e-9 * length)
-        inside &= (candidates != a) & (candidates != b) & (candidates != c)
-        if inside.any():
-            middle = int(candidates[np.flatnonzero(inside)[0]])
-            return [(a, middle, c), (middle, b, c)]
-    return []
 
 
 def triangulate_face(vertices: Points3, rings: Sequence[Integers]) -> Triangles:

@@ -23,7 +23,6 @@ from facade_tools.compiled import compiled
 
 from .arrays import Floats, Integers, Points2
 
-PARALLEL = 1e-9  # sine below which two edges are parallel
 DONE, UNLINKED, UNBOUNDED, EXHAUSTED = 0, 1, 2, 3
 
 # Columns of Front.place and Front.link.
@@ -118,8 +117,8 @@ def bury(front: Front, v: int, node: int) -> None:
 
 
 @compiled
-def set_course(edges: Edges, front: Front, v: int) -> bool:
-    """Set the velocity of a vertex; False when it has to jump (parallel edges)."""
+def set_course(edges: Edges, front: Front, v: int, near: float) -> bool:
+    """Set the velocity of a vertex; False when it has to jump (edges parallel within `near`)."""
     i, o = front.link[v, EIN], front.link[v, EOUT]
     ax, ay = edges.along[i, 0], edges.along[i, 1]
     bx, by = edges.along[o, 0], edges.along[o, 1]
@@ -132,7 +131,7 @@ def set_course(edges: Edges, front: Front, v: int) -> bool:
         front.place[v, VX] = scale * (edges.normal[i, 0] + edges.normal[o, 0])
         front.place[v, VY] = scale * (edges.normal[i, 1] + edges.normal[o, 1])
         return True
-    if abs(cross) <= PARALLEL:
+    if abs(cross) <= near:
         return False
     front.place[v, VX] = (bx * p - ax * q) / cross
     front.place[v, VY] = (by * p - ay * q) / cross
@@ -293,7 +292,7 @@ def settle(front: Front, time: float, near: float) -> int:
 
 
 @compiled
-def sort_stubs(edges: Edges, front: Front, stubs: int) -> None:
+def sort_stubs(edges: Edges, front: Front, stubs: int, near: float) -> None:
     """Sort stubs counter-clockwise by direction; of equal ones the leaving edge comes first."""
     angle = np.empty(stubs)
     stub = front.stub
@@ -301,13 +300,13 @@ def sort_stubs(edges: Edges, front: Front, stubs: int) -> None:
         sign = -1.0 if stub[k, 2] == 1 else 1.0
         e = stub[k, 0]
         angle[k] = math.atan2(sign * edges.along[e, 1], sign * edges.along[e, 0])
-        if angle[k] < -math.pi + PARALLEL:
+        if angle[k] < -math.pi + near:
             angle[k] += 2.0 * math.pi
     for k in range(1, stubs):
         j = k
         while j > 0:
             gap = angle[j - 1] - angle[j]
-            if not (gap > PARALLEL or (gap >= -PARALLEL and stub[j - 1, 2] > stub[j, 2])):
+            if not (gap > near or (gap >= -near and stub[j - 1, 2] > stub[j, 2])):
                 break
             angle[j - 1], angle[j] = angle[j], angle[j - 1]
             for c in range(3):
@@ -316,9 +315,9 @@ def sort_stubs(edges: Edges, front: Front, stubs: int) -> None:
 
 
 @compiled
-def relink(edges: Edges, front: Front, node: int, stubs: int) -> int:
+def relink(edges: Edges, front: Front, node: int, stubs: int, near: float) -> int:
     """Join each leaving stub with the next arriving one; return the first new vertex or -1."""
-    sort_stubs(edges, front, stubs)
+    sort_stubs(edges, front, stubs, near)
     first = front.size[V]
     for k in range(stubs):
         if front.stub[k, 2] == 1:
@@ -342,7 +341,7 @@ def launch(
     for v in range(first, front.size[V]):
         if front.link[v, ALIVE] == 0:
             continue
-        straight = set_course(edges, front, v)
+        straight = set_course(edges, front, v, near)
         if not straight or front.link[front.link[v, NEXT], NEXT] == v:
             front.place[v, VX] = front.place[v, VY] = 0.0
             heapq.heappush(heap, (front.place[v, T], JUMP, v, 0))
@@ -390,7 +389,7 @@ def part_touching(edges: Edges, front: Front, forced: Integers, near: float) -> 
         stubs = gather(edges, front, forced, 0.0, near)
         if stubs == 2:
             front.link[v, ALIVE] = 1
-        elif relink(edges, front, settle(front, 0.0, near), stubs) < 0:
+        elif relink(edges, front, settle(front, 0.0, near), stubs, near) < 0:
             return False
     return True
 
@@ -416,7 +415,7 @@ def propagate(edges: Edges, front: Front, near: float, limit: float) -> int:
         node = settle(front, now, near)
         if front.size[V] + stubs > room:
             return EXHAUSTED
-        first = relink(edges, front, node, stubs)
+        first = relink(edges, front, node, stubs, near)
         if first < 0:
             return UNLINKED
         launch(edges, front, heap, first, near, limit)

@@ -11,10 +11,20 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiled import compiled
-from ..geometry.arrays import Floats, Integers
+from ..geometry.arrays import Floats
 from .mass_attributes import GARAGE, GARAGE_AT, GENERAL, PORCH, PORCH_AT
 from .mass_energy import MOST_BOXES, Target, layout_energy
-from .mass_layout import CAPACITY, EMPTY, HEIGHT_LOCKED, PLAN_LOCKED, Layout, Work, copy_layout
+from .mass_layout import (
+    CAPACITY,
+    EMPTY,
+    HEIGHT_LOCKED,
+    PLAN_LOCKED,
+    Layout,
+    Work,
+    copy_layout,
+    new_layout,
+    new_work,
+)
 from .mass_polish import valid
 from .mass_search import (
     NEAT,
@@ -30,6 +40,7 @@ from .mass_starts import add_box, box_count, free_row, holds_part, part_row
 ITERATIONS = 10_000  # proposals at most (FW16)
 RESTARTS = 3
 HOPS = 300
+HOP = 1.5  # step length of a hop (m)
 FLUSH = 0.3  # share of resizes that make an edge flush with another box's
 SNAP = 0.10  # edges of two boxes closer than this are snapped (m)
 
@@ -252,44 +263,42 @@ def anneal(
 
 
 @compiled
-def hop(pool: Pool, target: Target, hops: int, rng: np.random.Generator, work: Work) -> None:
+def _mutate(pool: Pool, layout: Layout, target: Target, rng: np.random.Generator) -> None:
+    """Copy one of the best layouts into `layout`, and change it by a few operations."""
+    k = int(rng.random() ** 2 * len(pool.energies))
+    copy_layout(pooled(pool, k if pool.energies[k] < np.inf else 0), layout)
+    for _ in range(1 + int(rng.random() * 3)):
+        propose(layout, target, HOP, rng)
+
+
+def hop(pool: Pool, target: Target, work: Work, *, rng: np.random.Generator) -> None:
     """Basin hopping: change the best layouts by a few operations, polish, keep what is better."""
-    start = pooled(pool, 0)
-    layout = Layout(start.rows.copy(), start.kinds.copy(), start.locks.copy())
-    for _ in range(hops):
-        if pool.energies[0] == np.inf or rank(pool.energies[0], pool.taste[0]) < NEAT:
+    layout = new_layout()
+    for _ in range(HOPS if pool.energies[0] < np.inf else 0):
+        if rank(pool.energies[0], pool.taste[0]) < NEAT:
             break
-        k = int(rng.random() ** 2 * len(pool.energies))
-        copy_layout(pooled(pool, k if pool.energies[k] < np.inf else 0), layout)
-        for _ in range(1 + int(rng.random() * 3)):
-            propose(layout, target, 1.5, rng)
+        _mutate(pool, layout, target, rng)
         if valid(layout, target):
             settle(pool, layout, target, work)
 
 
-@compiled
 def search(
-    pool: Pool,
-    base: Layout,
-    target: Target,
-    rng: np.random.Generator,
-    work: Work,
-    effort: Integers,
+    pool: Pool, base: Layout, target: Target, rounds: int, *, rng: np.random.Generator
 ) -> None:
     """Fill `pool` with the best layouts around the locked boxes of `base`.
 
-    effort: rounds of informed starts, restarts of annealing. Where informed starts and basin
-    hopping leave an energy above FW16's threshold, annealing from the best and from nothing
-    has its turn.
+    rounds: of informed starts, at least. Where they and basin hopping leave an energy above
+    FW16's threshold, annealing from the best and from nothing has its turn.
     """
-    for number in range(4 * effort[0]):
-        if number >= effort[0] and rank(pool.energies[0], pool.taste[0]) < NEAT:
+    work = new_work()
+    for number in range(4 * rounds):
+        if number >= rounds and rank(pool.energies[0], pool.taste[0]) < NEAT:
             break
-        informed_round(pool, base, target, rng, work)
+        informed_round(pool, base, target, work, rng=rng)
     trace = np.zeros(1)
     layout = Layout(base.rows.copy(), base.kinds.copy(), base.locks.copy())
-    hop(pool, target, HOPS, rng, work)
-    for restart in range(effort[1]):
+    hop(pool, target, work, rng=rng)
+    for restart in range(RESTARTS):
         if pool.energies[0] < THRESHOLD:
             break
         refine = restart > 0 and pool.energies[0] < np.inf

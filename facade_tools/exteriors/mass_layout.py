@@ -237,6 +237,15 @@ def attributes_of_layout(layout: Layout, storey_height: float, work: Work) -> bo
 
 
 @compiled
+def holds(layout: Layout, kind: int) -> bool:
+    """Tell whether there is a box of a kind."""
+    found = False
+    for other in layout.kinds:
+        found = found or other == kind
+    return found
+
+
+@compiled
 def move_to_origin(layout: Layout) -> None:
     """Move all boxes so that the mass starts at x = 0, y = 0."""
     bounds, _ = layout_bounds(layout, 0.0, False)

@@ -25,6 +25,7 @@ from .mass_layout import (
     Work,
     attributes_of_layout,
     connected,
+    holds,
     thinness,
 )
 
@@ -125,7 +126,7 @@ def valid(layout: Layout, target: Target) -> bool:
             return False
         if height < low and layout.locks[k] & HEIGHT_LOCKED == 0:
             return False
-    return bool((layout.kinds == GENERAL).any())
+    return holds(layout, GENERAL)
 
 
 @compiled
@@ -194,6 +195,16 @@ def _normal_equations(
 
 
 @compiled
+def _step_to(start: Floats, step: Floats, out: Floats) -> None:
+    """Write start − step, the step shortened so that no line moves more than LONGEST_MOVE."""
+    longest = LONGEST_MOVE
+    for v in range(len(step)):
+        longest = max(longest, abs(step[v]))
+    for v in range(len(step)):
+        out[v] = start[v] - step[v] * (LONGEST_MOVE / longest)
+
+
+@compiled
 def polish(layout: Layout, target: Target, work: Work) -> float:
     """Move lines and heights to a local minimum of the energy; return it.
 
@@ -202,6 +213,7 @@ def polish(layout: Layout, target: Target, work: Work) -> float:
     variables = gather(layout)
     base, trial = np.zeros(MASS_SIZE + 1), np.zeros(MASS_SIZE + 1)
     energy = _residuals(layout, target, work, base)
+    values = variables.values.copy()
     damping = 1e-4
     for _ in range(ROUNDS):
         if energy < SOLVED or len(variables.values) == 0:
@@ -210,8 +222,7 @@ def polish(layout: Layout, target: Target, work: Work) -> float:
         before = energy
         for _ in range(8):
             step = _solve(square, right, damping)
-            longest = max(np.abs(step).max(), LONGEST_MOVE)
-            values = variables.values - step * (LONGEST_MOVE / longest)
+            _step_to(variables.values, step, values)
             scatter(variables, values, layout)
             energy = _residuals(layout, target, work, trial)
             if energy < before and valid(layout, target):
@@ -231,4 +242,6 @@ def polish(layout: Layout, target: Target, work: Work) -> float:
 def round_layout(layout: Layout, digits_step: float) -> None:
     """Round free lines and heights to multiples of `digits_step` (m), flush edges together."""
     variables = gather(layout)
-    scatter(variables, np.rint(variables.values / digits_step) * digits_step, layout)
+    for v in range(len(variables.values)):
+        variables.values[v] = np.rint(variables.values[v] / digits_step) * digits_step
+    scatter(variables, variables.values, layout)

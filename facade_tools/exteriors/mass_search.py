@@ -116,26 +116,23 @@ def settle(pool: Pool, layout: Layout, target: Target, work: Work) -> float:
 
 
 @compiled
-def informed_round(
-    pool: Pool, base: Layout, target: Target, rng: np.random.Generator, work: Work
+def _draw_starts(
+    best: Pool, base: Layout, target: Target, rng: np.random.Generator, work: Work
 ) -> None:
-    """Draw STARTS layouts around `base`, polish the most promising, offer them to `pool`."""
-    size = (POLISHED, CAPACITY)
-    best = Pool(
-        np.zeros((POLISHED, CAPACITY, 5)),
-        np.full(size, -1, dtype=np.int64),
-        np.zeros(size, dtype=np.int64),
-        np.full(POLISHED, np.inf),
-        np.full(POLISHED, np.inf),
-        pool.history,
-        pool.counts,
-    )
+    """Draw STARTS layouts around `base` and offer them, as they are, to `best`."""
     layout = Layout(base.rows.copy(), base.kinds.copy(), base.locks.copy())
     for _ in range(STARTS):
         draw_start(base, target, rng, work, layout)
         if valid(layout, target):
             energy = layout_energy(layout, target, work)
             offer(best, layout, energy + BOX_PRICE * box_count(layout.kinds), 0.0)
-    for k in range(POLISHED):
-        if best.energies[k] < np.inf:
-            settle(pool, pooled(best, k), target, work)
+
+
+def informed_round(
+    pool: Pool, base: Layout, target: Target, work: Work, *, rng: np.random.Generator
+) -> None:
+    """Draw STARTS layouts around `base`, polish the most promising, offer them to `pool`."""
+    best = new_pool(POLISHED)
+    _draw_starts(best, base, target, rng, work)
+    for k in np.flatnonzero(np.isfinite(best.energies)).tolist():
+        settle(pool, pooled(best, k), target, work)

@@ -21,6 +21,7 @@ from .mass_layout import (
     Layout,
     Work,
     copy_layout,
+    holds,
 )
 
 FREE_LINES = 2  # a direction
@@ -67,11 +68,6 @@ def _draw_origin(base: Layout, axis: int, size: float, rng: np.random.Generator)
     if chance < 0.35:
         return first
     return last if chance < 0.7 else first + (last - first) * rng.random()
-
-
-@compiled
-def _holds(layout: Layout, kind: int) -> bool:
-    return bool((layout.kinds == kind).any())
 
 
 @compiled
@@ -222,7 +218,7 @@ def draw_start(
     lower = target.tower and rng.random() < 0.8
     if lower:
         add_box(out, GENERAL, _draw_tower(frame, target.values[2], rng))
-    locked = _holds(base, GENERAL)
+    locked = holds(base, GENERAL)
     count = min(int(rng.random() ** 1.6 * MOST_DRAWN) + (0 if locked else 1), target.extra)
     tries = TRIES if rng.random() < 0.7 else 1
     for number in range(count):

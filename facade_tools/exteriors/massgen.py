@@ -12,12 +12,12 @@ from ..artifacts.attributes import Attributes
 from ..artifacts.building import Box, Building, Energy
 from ..artifacts.model import Model
 from ..errors import Infeasible
-from .annealing import RESTARTS, search
+from .annealing import search
 from .mass_attributes import KINDS
 from .mass_candidates import diverse
 from .mass_energy import Target, layout_of, mass_energy, relative_residuals
 from .mass_hints import search_target
-from .mass_layout import EMPTY, Layout, move_to_origin, new_work
+from .mass_layout import EMPTY, Layout, move_to_origin
 from .mass_polish import round_layout
 from .mass_roofs import chimney_of, draw_roof_plan, roofed, with_tower
 from .mass_search import new_pool, pooled
@@ -88,7 +88,7 @@ def find_masses(
     base = layout_of(known, locked=True)
     pool = new_pool(POOL)
     rounds = 2 if count == 1 else 4 + count
-    search(pool, base, target, rng, new_work(), np.array([rounds, RESTARTS]))
+    search(pool, base, target, rounds, rng=rng)
     found = []
     rows = pool.history[: pool.counts[1]].tolist()
     curve = tuple((int(done), float(f"{energy:.4g}")) for done, energy in rows)

@@ -206,3 +206,16 @@ def test_nearly_parallel_and_nearly_simultaneous(noise: float) -> None:
         rings = [(ring + rng.normal(0, noise, ring.shape)) @ frame for ring in rings]
         if shapely.Polygon(rings[0], rings[1:]).is_valid:
             straight_skeleton(rings)
+
+
+def test_thousand_corners() -> None:
+    turn = np.arange(1000) * (2 * np.pi / 1000)
+    radii = np.random.default_rng(0).uniform(80, 100, 1000)
+    ring = np.column_stack([radii * np.cos(turn), radii * np.sin(turn)])
+    assert len(straight_skeleton([ring]).faces) == 1000
+
+
+def test_too_many_edges_are_refused() -> None:
+    turn = np.arange(7000) * (2 * np.pi / 7000)
+    with pytest.raises(SkeletonFailed, match="at most"):
+        straight_skeleton([np.column_stack([np.cos(turn), np.sin(turn)])])

@@ -21,6 +21,7 @@ from .wavefront import DONE, Edges, Front, propagate, traced, wavefront
 __all__ = ["Contour", "Skeleton", "SkeletonFailed", "skeleton_by", "straight_skeleton"]
 
 LOG = logging.getLogger("facade_tools.geometry")
+MOST_EDGES = 6000  # time and memory grow with their square: about 3 s and 400 MB
 
 
 class SkeletonFailed(FacadeError):
@@ -65,9 +66,11 @@ def straight_skeleton(rings: Rings, speeds: Sequence[float] | Floats | None = No
     Every result is verified (faces tile the polygon, one an edge, every node on the planes of
     its faces); one that fails is computed again with other tolerances, turned, and with its
     edges displaced by at most 1e-8 of its size; nodes are then put back on their planes. Raises
-    SkeletonFailed when none passes.
+    SkeletonFailed when none passes, and for more than MOST_EDGES edges.
     """
     contour = Contour.of(rings, speeds)
+    if len(contour.points) > MOST_EDGES:
+        raise SkeletonFailed(f"{len(contour.points)} edges, at most {MOST_EDGES} are taken")
     for path in range(len(_PATHS)):
         skeleton, problem = skeleton_by(contour, path)
         if skeleton is not None and not problem:

@@ -14,11 +14,13 @@ from facade_tools.artifacts.numbers import dump_line
 from facade_tools.artifacts.store import RawItem
 from facade_tools.artifacts.writing import write_bytes
 from facade_tools.errors import FacadeError, InvalidInput, OutputFailed
-from facade_tools.formats.exporting import ENDINGS, model_files, placed
+from facade_tools.formats.exporting import ENDINGS, model_files, placed, vertex_count
 
 from ._items import each, load
 from ._options import StreamOptions
 from ._stream import file_name, is_folder
+
+MOST_VERTICES = 30_000_000  # in one file: about 2 GB of memory
 
 # Kind of artifact -> function that makes a Scene of it; what a GLB or OBJ shows.
 SCENES = {
@@ -124,8 +126,15 @@ def _to_stdout(stream: StreamOptions, form: str, arrange: str) -> None:
 
 
 def _parts(stream: StreamOptions, form: str, arrange: str) -> list[Any]:
-    pairs = list(each("export", Part(form), stream))
-    parts, frames = [part for part, _ in pairs], [frame for _, frame in pairs]
+    parts, frames, size = [], [], 0
+    for part, frame in each("export", Part(form), stream):
+        parts.append(part)
+        frames.append(frame)
+        size += vertex_count(part)
+        if size > MOST_VERTICES:
+            raise InvalidInput(
+                f"more than {MOST_VERTICES:,} vertices; export to a folder or fewer items at a time"
+            )
     names = [part.name for part in parts]
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)

@@ -29,6 +29,7 @@ from ._options import StreamOptions
 from .view import DRAWINGS
 
 MOST_PICTURES = 2000
+LARGEST_PAGE = 256 << 20  # bytes of the items of a page
 LARGE = (960, 720)  # pixels of the only picture
 SMALL = (400, 300)  # of one of several
 
@@ -139,10 +140,14 @@ def _views(options: ViewOptions, size: tuple[int, int]) -> tuple[View, ...]:
 
 
 def _page(stream: StreamOptions, title: str) -> bytes:
-    exhibits = []
+    exhibits: list[Exhibit] = []
+    size = 0
     for name, drawn in each("view", Drawing(), stream):
         if isinstance(drawn, Scene):
             exhibits.append(Exhibit(name, "model", write_glb([drawn], name)))
         else:
             exhibits.append(Exhibit(name, "picture", write_png(np.asarray(drawn))))
+        size += len(exhibits[-1].data)
+        if size > LARGEST_PAGE:
+            raise InvalidInput(f"a page of more than {LARGEST_PAGE >> 20} MiB; draw fewer items")
     return page(exhibits, title)

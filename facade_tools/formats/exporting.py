@@ -83,6 +83,13 @@ def _turn(degrees: float) -> Floats:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
+def vertex_count(part: Scene | CityModel) -> int:
+    """Return how many vertices a part holds, by which memory is bounded."""
+    if isinstance(part, Scene):
+        return sum(len(mesh.vertices) for mesh in part.meshes)
+    return len(part.vertices)
+
+
 def _bounds(part: Scene | CityModel) -> Floats:
     return bounds(part) if isinstance(part, Scene) else part.bounds()
 

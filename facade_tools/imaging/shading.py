@@ -78,7 +78,7 @@ def shade(owner: Integers, inverse: Floats, soup: Soup, eye: Eye, sun: Sun, air:
                 _base(owner[j, i], point, soup, air, color)
                 open_share = 1.0
                 if not bare or fade == 0.0:  # ground away from the scene has nothing over it
-                    open_share = _open(i, j, point, normal, depths, eye, air.ball)
+                    open_share = _open((i, j), point, normal, depths, eye, air.ball)
                 _lit(point, normal, open_share, sun, air, color)
                 if not bare and soup.gloss[soup.looks[owner[j, i]]] > 0.0:
                     _mirror(point, normal, eye, air, color)
@@ -218,7 +218,7 @@ def _texture(triangle: int, picture: Integers, point: Floats, soup: Soup, color:
 
 @compiled
 def _open(
-    i: int, j: int, point: Floats, normal: Floats, depths: Floats, eye: Eye, ball: Floats
+    pixel: tuple[int, int], point: Floats, normal: Floats, depths: Floats, eye: Eye, ball: Floats
 ) -> float:
     """Return the open share of the hemisphere over a pixel, from the depths around it.
 
@@ -226,7 +226,7 @@ def _open(
     on a generator.
     """
     height, width = depths.shape
-    angle = ((i * 73856093 ^ j * 19349663) & 0xFFFF) * (2.0 * pi / 65536.0)
+    angle = ((pixel[0] * 73856093 ^ pixel[1] * 19349663) & 0xFFFF) * (2.0 * pi / 65536.0)
     cosine, sine = cos(angle), sin(angle)
     hidden = 0.0
     for k in range(len(ball)):

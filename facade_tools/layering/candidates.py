@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import daqp
@@ -34,7 +34,15 @@ class Generator:
     `complete` becomes False where a bound left words out.
     """
 
-    def __init__(self, direction: Direction, groups: Sequence[str], tolerance: float) -> None:
+    def __init__(
+        self,
+        direction: Direction,
+        groups: Sequence[str],
+        tolerance: float,
+        late: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """Prepare; `late` tells when to stop, which leaves the rest out."""
+        self.late = late
         self.direction = direction
         self.rows = [row for group in groups for row in direction.groups[group]]
         self.parts = tuple(len(direction.groups[group]) for group in groups)
@@ -66,7 +74,7 @@ class Generator:
     def _assign(
         self, names: list[str], ranges: dict[str, tuple[int, int]]
     ) -> Iterator[dict[str, int]]:
-        if not self._possible(ranges):
+        if self._stopped() or not self._possible(ranges):
             return
         name = next((name for name in names if ranges[name][0] < ranges[name][1]), None)
         if name is None:
@@ -80,6 +88,11 @@ class Generator:
             elif self._possible(part):
                 for value in range(start, end + 1):
                     yield from self._assign(names, ranges | {name: (value, value)})
+
+    def _stopped(self) -> bool:
+        late = self.late()
+        self.complete = self.complete and not late
+        return late
 
     def _possible(self, ranges: Ranges) -> bool:
         how = Expansion({}, self.least, self.limit)
@@ -111,6 +124,8 @@ class Generator:
     ) -> Iterator[tuple[Word, ...]]:
         if len(head) == len(lists):
             yield head
+            return
+        if self._stopped():
             return
         opaque = 0.0 if len(head) in self.tops else opaque
         least = self.canvas - self.tolerance - opaque - self.slack

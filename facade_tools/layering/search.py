@@ -126,7 +126,7 @@ class GroupSearch:
                     best is None or self._before(found.alignment, best)
                 ):
                     best = found.alignment
-                if self.clock.over() and best is not None:
+                if self.clock.over():
                     return best
             if best is not None or self.clock.over():
                 return best
@@ -137,7 +137,7 @@ class GroupSearch:
         if tolerance in self._kept:
             yield from self._kept[tolerance][0]
             return
-        generator = Generator(self.direction, self.groups, tolerance)
+        generator = Generator(self.direction, self.groups, tolerance, self.clock.over)
         kept: list[Candidate] = []
         for candidate in generator.candidates():
             kept.append(candidate)

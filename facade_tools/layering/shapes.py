@@ -129,13 +129,12 @@ def _mask(stack: Stack, layer: DesignLayer, axis: str) -> set[str]:
 
 def _uncovered(stack: Stack, shapes: list[LayoutShape]) -> tuple[LayoutShape, ...]:
     """Hide shapes that lie wholly behind opaque boxes of the layers above them."""
-    xs = np.unique(np.round([v for s in shapes for v in (s.x0, s.x1)], 9))
-    ys = np.unique(np.round([v for s in shapes for v in (s.y0, s.y1)], 9))
+    xs, ys = _places(shapes, "x0", "x1"), _places(shapes, "y0", "y1")
     covered = np.zeros((len(ys), len(xs)), dtype=bool)
     out = []
     for shape in shapes:
-        x0, x1 = np.searchsorted(xs, np.round([shape.x0, shape.x1], 9))
-        y0, y1 = np.searchsorted(ys, np.round([shape.y0, shape.y1], 9))
+        x0, x1 = xs[round(shape.x0, 9)], xs[round(shape.x1, 9)]
+        y0, y1 = ys[round(shape.y0, 9)], ys[round(shape.y1, 9)]
         cells = covered[y0:y1, x0:x1]
         if shape.visible and cells.all():
             shape = replace(shape, visible=False)
@@ -143,6 +142,12 @@ def _uncovered(stack: Stack, shapes: list[LayoutShape]) -> tuple[LayoutShape, ..
             cells[:] = True
         out.append(shape)
     return tuple(out)
+
+
+def _places(shapes: Sequence[LayoutShape], low: str, high: str) -> dict[float, int]:
+    """Return the rank of every border."""
+    values = {round(getattr(shape, end), 9) for shape in shapes for end in (low, high)}
+    return {value: rank for rank, value in enumerate(sorted(values))}
 
 
 def _covers(stack: Stack, shape: LayoutShape) -> bool:

@@ -8,7 +8,7 @@ s and t follow. Solved exactly by an active-set method (daqp).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import daqp
@@ -23,7 +23,8 @@ Floats = NDArray[np.float64]
 Piece = tuple[int, int, int, int]  # alignment, row, letter, column
 Tag = tuple[int, int]  # alignment, column; column -1 belongs to no column
 
-FAINT = 1e-9  # weight of what no objective term names, against 1 for a sized symbol
+FAINT = 1e-7  # weight of what no objective term names, against 1 for a sized symbol
+FIRMER = (1.0, 1e2, 1e4, 1e6)  # times FAINT, where daqp finds the problem too badly scaled
 EQUAL = 5  # daqp's mark of an equality
 TIGHT = 1e-10  # of the canvas: closer to its bound is on it
 
@@ -218,14 +219,24 @@ def solve(direction: Direction, alignments: Sequence[Alignment]) -> Sizing:
     """
     equations = system(direction, alignments)
     reduced = _reduced(equations.matrix, equations.right)
-    x, flag = (equations.wish, 0) if reduced is None else _solve(*reduced, equations)
-    if reduced is None or flag != 1:
-        raise Infeasible(f"{direction.axis}: no sizes of the symbols fill the canvas")
+    x = None if reduced is None else _closest(*reduced, equations)
+    if reduced is None or x is None:
+        where = f"{direction.axis} ({direction.canvas:g} m)"
+        raise Infeasible(f"{where}: no sizes of the symbols fill the canvas")
     x = _polished(*reduced, equations, x) * direction.canvas
     count = len(equations.names)
     sizes = dict(zip(equations.names, x[:count].tolist(), strict=True))
     pieces = dict(zip(equations.pieces, x[count:].tolist(), strict=True))
     return Sizing(sizes, pieces, _residual(direction, sizes))
+
+
+def _closest(matrix: Floats, right: Floats, goal: System) -> Floats | None:
+    for times in FIRMER:
+        weight = np.where(goal.weight == 1.0, 1.0, FAINT * times)
+        x, flag = _solve(matrix, right, replace(goal, weight=weight))
+        if flag == 1:
+            return x
+    return None
 
 
 def _polished(matrix: Floats, right: Floats, goal: System, x: Floats) -> Floats:

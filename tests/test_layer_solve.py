@@ -1,0 +1,183 @@
+"""`facade layer-solve`: designs to layouts, pictures, meshes, errors."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from facade_tools.artifacts.documents import decode, encode
+from facade_tools.artifacts.numbers import canonical, dump_document
+from facade_tools.artifacts.store import read_one
+from facade_tools.errors import Infeasible
+from facade_tools.layering.drawing import layout_picture, sheet_bytes
+from facade_tools.layering.elements import facade_elements
+from facade_tools.layering.scene import layout_scene
+from facade_tools.layering.solve import solve_design, variations
+
+ROOT = Path(__file__).resolve().parent.parent
+DESIGNS = sorted((ROOT / "sample_data" / "designs").glob("*.yaml"))
+RESIDENTIAL = ROOT / "sample_data" / "designs" / "residential-9.yaml"
+GOLDEN = ROOT / "tests" / "golden" / "layouts"
+
+
+def design(path=RESIDENTIAL):
+    return replace(read_one(str(path), "design"), id=path.stem)
+
+
+def check(layout):
+    """What every layout promises."""
+    for axis, length in (("x", layout.canvas.width), ("y", layout.canvas.height)):
+        for group in getattr(layout, axis).values():
+            assert group.boundaries[0] == 0.0
+            assert group.boundaries[-1] == length
+            assert np.all(np.diff(group.boundaries) > 0)
+            for word, columns, borders in zip(
+                group.words, group.columns, group.borders, strict=True
+            ):
+                flat = [name for column in columns for name in column]
+                assert group.pieces or tuple(flat) == word
+                assert np.all(np.diff(borders) >= -1e-9)
+            for j in range(len(group.boundaries) - 1):
+                assert any(row[j] for row in group.columns)
+                width = group.boundaries[j + 1] - group.boundaries[j]
+                for row in group.columns:
+                    if row[j] and group.pieces == 0:
+                        total = sum(group.sizes[name.lstrip("~")] for name in row[j])
+                        assert total == pytest.approx(width, abs=1e-8)
+    for shape in layout.shapes:
+        assert shape.x1 >= shape.x0
+        assert shape.y1 >= shape.y0
+
+
+@pytest.mark.parametrize("path", DESIGNS, ids=lambda path: path.stem)
+def test_every_sample_design_is_solved_and_proved(path):
+    layout = solve_design(design(path), time_limit=60.0)
+    check(layout)
+    groups = [*layout.x.values(), *layout.y.values()]
+    assert all(group.optimal and group.gap == 0.0 for group in groups)
+    again = decode(json.loads(json.dumps(canonical(encode(layout)))), "layout")
+    assert encode(again) == canonical(encode(layout))
+
+
+@pytest.mark.parametrize("name", ["residential-9", "terraced-balconies"])
+def test_golden(name, update_golden):
+    data = dump_document(encode(solve_design(design(RESIDENTIAL.with_stem(name)), time_limit=60)))
+    path = GOLDEN / f"{name}.json"
+    if update_golden:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(data)
+    assert path.read_bytes() == data
+
+
+@given(width=st.floats(0.5, 20.0), height=st.floats(0.5, 8.0))
+@settings(max_examples=15, deadline=None)
+def test_any_canvas_is_solved_without_holes_or_refused(width, height):
+    try:
+        layout = solve_design(design(), width=width, height=height)
+    except Infeasible as error:
+        assert " m)" in str(error)
+    else:
+        check(layout)
+
+
+def test_masks_looks_and_occlusion():
+    layout = solve_design(design())
+    columns = [s for s in layout.shapes if s.layer == "columns"]
+    assert {s.symbols for s in columns if s.visible} == {("C", "P")}
+    assert all(s.depth == 0.3 and s.mesh == "column.obj" for s in columns if s.visible)
+    assert all(s.visible for s in layout.shapes if s.layer == "base")
+
+
+def test_scene_of_a_layout():
+    layout = solve_design(design())
+    text = (RESIDENTIAL.parent / "column.obj").read_text()
+    layout = replace(layout, assets={"column.obj": {"media": "model/obj", "data": text}})
+    scene = layout_scene(layout)
+    names = {mesh.name for mesh in scene.meshes}
+    assert "columns/CP" in names
+    for mesh in scene.meshes:
+        corners = mesh.vertices[mesh.faces]
+        volume = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
+        assert volume.sum() > 0  # outward
+        assert mesh.vertices[:, 0].min() >= -1e-9
+        assert mesh.vertices[:, 0].max() <= 6 + 1e-9
+
+
+def test_mirrored_shapes_keep_their_orientation():
+    source = design()
+    flipped = replace(source, patterns={**source.patterns, "Cx": {"control": "cec^-1", "c": "C"}})
+    layout = solve_design(flipped)
+    assert ("~C", "P") in {s.symbols for s in layout.shapes}
+    for mesh in layout_scene(layout).meshes:
+        corners = mesh.vertices[mesh.faces]
+        volume = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
+        assert volume.sum() > 0
+
+
+def test_drawings():
+    layout = solve_design(design())
+    picture = layout_picture(layout)
+    assert picture.ndim == 3
+    assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 5
+    svg = sheet_bytes([layout, layout], ".svg")
+    assert svg.startswith(b"<svg")
+    assert svg.count(b">CP<") == 4
+
+
+def test_facade_elements():
+    elements = facade_elements(solve_design(design(RESIDENTIAL.with_stem("haussmann"))))
+    assert {element.kind for element in elements} == {"window", "door"}
+    assert all(element.width > 0 and element.height > 0 for element in elements)
+
+
+def test_variations_differ_and_start_with_the_best():
+    source = design(RESIDENTIAL.with_stem("modern"))
+    source = replace(source, layers=source.layers[2:])
+    found = list(variations(source, time_limit=20.0))
+    assert len({layout.id for layout in found}) == len(found) > 1
+    assert encode(found[0]) == encode(solve_design(source))
+
+
+def test_command(facade, tmp_path):
+    out = tmp_path / "layout.json"
+    done = facade("layer-solve", RESIDENTIAL, "-o", out, "--sheet", tmp_path / "sheet.png")
+    assert (done.returncode, done.stdout, done.stderr) == (0, b"", b"")
+    layout = json.loads(out.read_bytes())
+    assert layout["provenance"]["inputs"][0]["name"] == "residential-9.yaml"
+    assert layout["assets"]["column.obj"]["media"] == "model/obj"
+    assert (tmp_path / "sheet.png").read_bytes()[:4] == b"\x89PNG"
+    done = facade("export", out, "-o", tmp_path / "model.glb")
+    assert done.returncode == 0, done.stderr
+    sweep = facade("layer-solve", RESIDENTIAL, "--width", "6:8:2")
+    assert [json.loads(line)["id"] for line in sweep.stdout.splitlines()] == [
+        "residential-9-6x3", "residential-9-8x3"
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "code", "expected"),
+    [
+        ('"A(BA)^k"', '"A(BA^k"', 3, ":5: /patterns/Bx: pattern, line 1, column 7"),
+        ("opaque: false", "opak: false", 3, "'opak' was unexpected"),
+        ("counters: {k: auto}", "counters: {}", 3, "counter 'k'"),
+        ("x: Cx", "x: Cy", 3, ":7: /layers/0/x: pattern 'Cy' does not exist"),
+        ("width: 6", "width: 0.1", 4, "x (0.1 m): layer"),
+    ],
+)
+def test_command_refuses(facade, tmp_path, old, new, code, expected):
+    text = RESIDENTIAL.read_text()
+    assert old in text
+    path = tmp_path / "bad.yaml"
+    path.write_text(text.replace(old, new))
+    done = facade("layer-solve", path)
+    message = done.stderr.decode()
+    assert done.returncode == code, message
+    assert expected in message
+    assert message.count("\n") == 1
+    assert done.stdout == b""

@@ -1,0 +1,254 @@
+"""IMAW15: language, words, alignment against a brute force, sizing against a reference."""
+
+from __future__ import annotations
+
+import random
+import time
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from layering_oracle import TooLarge, best, random_direction, words_of
+
+from facade_tools.errors import Infeasible, InvalidInput
+from facade_tools.layering import sizing
+from facade_tools.layering.evaluation import evaluate
+from facade_tools.layering.language import PatternError, Substituted, parse, symbol_pair
+from facade_tools.layering.problem import Candidate, Direction, LayerPattern, Rule, Span
+from facade_tools.layering.search import Clock, GroupSearch
+from facade_tools.layering.solve import solve_direction
+from facade_tools.layering.words import Expansion, Letter, expand, reflected
+
+SIZES = {name: 1.0 for name in "ABCcexyz"}
+WORKED = {"A": Rule(2), "B": Rule(3), "C": Rule(2), "e": Rule(8), "f": Rule(5)}
+CEC = Substituted(parse("cec"), (("c", parse("C")),))
+FAF = Substituted(parse("faf"), (("a", parse("A")),))
+
+
+def texts(pattern, **counters):
+    node = parse(pattern) if isinstance(pattern, str) else pattern
+    words = expand(node, Expansion(counters, SIZES, 40.0)).words
+    return ["".join(letter.name for letter in word) for word in words]
+
+
+def direction(nodes, canvas, rules=WORKED, counters=None):
+    rows = tuple(LayerPattern(f"layer {i}", f"P{i}", node) for i, node in enumerate(nodes))
+    return Direction("x", canvas, rules, {"default": rows}, counters or {})
+
+
+def answer(problem, seconds=60.0):
+    return GroupSearch(problem, ("default",), Clock(time.monotonic() + seconds)).answer()
+
+
+def columns(alignment):
+    rows = range(len(alignment.candidate.words))
+    return [
+        ["".join(a.name for a in alignment.column(i, j)) for j in range(alignment.count)]
+        for i in rows
+    ]
+
+
+class TestLanguage:
+    @pytest.mark.parametrize(
+        ("pattern", "counters", "words"),
+        [
+            ("A|B", {}, ["A", "B"]),
+            ("A(B|C)", {}, ["AB", "AC"]),
+            ("A(BA)^k", {"k": 2}, ["ABABA"]),
+            ("A(BA)^0", {}, ["A"]),
+            ("(AB)^-1", {}, ["~B~A"]),
+            ("(AB)^(k-3)", {"k": 1}, ["~B~A~B~A"]),
+            ("(A|B)^2", {}, ["AA", "AB", "BA", "BB"]),
+            ("((AB)^2C)^(2*k-1)", {"k": 1}, ["ABABC"]),
+            (" A · B\n", {}, ["AB"]),
+        ],
+    )
+    def test_words(self, pattern, counters, words):
+        assert texts(pattern, **counters) == words
+
+    def test_control_letters_are_transparent_and_substitutes_are_one_word(self):
+        node = Substituted(parse("xexz^-1"), (("x", parse("A|BC")), ("z", parse("AB"))))
+        assert texts(node) == ["AeA~B~A", "BCeBC~B~A"]
+        (first, *_) = expand(node, Expansion({}, SIZES, 40.0)).words
+        assert [a.transparent for a in first] == [False, True, False, False, False]
+
+    @pytest.mark.parametrize(
+        ("mode", "name"), [("reverse", "BA"), ("mirror", "~A~B"), ("reverse-mirror", "~B~A")]
+    )
+    def test_reflections(self, mode, name):
+        word = (Letter("A"), Letter("B"))
+        assert "".join(a.name for a in reflected(word, mode)) == name
+        assert reflected(reflected(word, mode), mode) == word
+
+    @pytest.mark.parametrize(
+        ("text", "column"),
+        [("A(B", 4), ("A^", 3), ("{x", 1), ("A|", 3), ("A)", 2), ("3", 1), ("A$", 2), ("", 1)],
+    )
+    def test_errors_have_a_place(self, text, column):
+        with pytest.raises(PatternError) as error:
+            parse(text)
+        assert (error.value.line, error.value.column) == (1, column)
+        assert "‸" in str(error.value)
+        assert error.value.picture().split("\n")[1] == " " * (column - 1) + "^"
+
+    @given(st.text(alphabet="ABk123()|^-+*{} x\n·~", max_size=40))
+    @settings(max_examples=300, deadline=None)
+    def test_any_text_is_parsed_or_refused_with_a_position(self, text):
+        try:
+            node = parse(text)
+        except PatternError as error:
+            assert 0 <= error.offset <= len(text)
+        else:
+            assert node == parse(text)
+
+    def test_expansion_is_bounded(self):
+        found = expand(parse("(A|B)^16"), Expansion({}, SIZES, 100.0))
+        assert len(found.words) <= 4096
+        assert not found.complete
+        assert expand(parse("((A^999)^999)^999"), Expansion({}, SIZES, 50.0)).words == []
+
+    def test_shape_names(self):
+        assert symbol_pair("C1{front door}") == ("C1", "front door")
+        assert symbol_pair("*P") == ("*", "P")
+        with pytest.raises(PatternError):
+            symbol_pair("C")
+
+
+class TestWorkedExamples:
+    @pytest.mark.parametrize(
+        ("borders", "error"),
+        [
+            ([(2, 3), (3, 5)], 6.0),  # Ce|C over ABA|BA
+            ([(1, 0), (2, 5), (3, 5)], 4.0),  # C|e|C over ε|ABABA|ε
+            ([(1, 1), (2, 4), (3, 5)], 0.0),  # C|e|C over A|BAB|A
+        ],
+    )
+    def test_three_alignments_of_two_words(self, borders, error):
+        problem = direction([CEC, parse("ABABA")], 12.0)
+        assert self.measured(problem, borders)[1] == pytest.approx(error, abs=1e-12)
+
+    @pytest.mark.parametrize(
+        ("borders", "measures"),
+        [
+            ([(1, 1, 1), (2, 2, 4), (3, 3, 5)], (18.0, 12.0)),
+            ([(0, 1, 1), (1, 1, 2), (2, 2, 3), (3, 2, 4), (3, 3, 5)], (22.0, 10.0)),
+            ([(0, 1, 1), (3, 2, 4), (3, 3, 5)], (16.0, 4.0)),
+        ],
+    )
+    def test_three_alignments_of_three_words(self, borders, measures):
+        problem = direction([FAF, CEC, parse("ABABA")], 12.0)
+        assert self.measured(problem, borders) == pytest.approx(measures, abs=1e-12)
+
+    def measured(self, problem, borders):
+        words = tuple(words_of(problem, row)[0] for row in problem.groups["default"])
+        lines = [(0,) * len(words), *borders]
+        spans = tuple(tuple(Span(n) for n in line) for line in lines)
+        found = evaluate(problem, Candidate(words, parts=(len(words),)), spans, 0.4, {})
+        return found.sigma, found.omega
+
+    def test_two_words(self):
+        found = answer(direction([CEC, parse("ABABA")], 12.0))
+        assert found.optimal
+        assert found.alignment.omega == 0.0
+        assert columns(found.alignment) == [["C", "e", "C"], ["A", "BAB", "A"]]
+
+    def test_transparent_splits(self):
+        problem = direction([FAF, CEC, parse("ABABA")], 12.0)
+        solved = solve_direction(problem, 60.0)
+        found = solved.answers["default"]
+        assert found.optimal
+        assert found.alignment.omega == 0.0
+        assert found.alignment.sigma == 12.0
+        assert columns(found.alignment) == [
+            ["f", "f", "A", "f", "f"], ["C", "e", "e", "e", "C"], ["A", "B", "A", "B", "A"]
+        ]  # fmt: skip
+        from facade_tools.layering.solve import _boundaries
+
+        assert _boundaries(solved, "default") == pytest.approx([0, 2, 5, 7, 10, 12], abs=1e-9)
+
+
+class TestAlignment:
+    @pytest.mark.parametrize("seed", [s for s in range(60) if s != 23])
+    def test_equals_the_brute_force(self, seed):
+        """µ, Ω, pieces, columns (and |Σ − canvas| without unsized symbols) on random designs."""
+        problem = random_direction(random.Random(seed), letters=4, layers=3, unsized=0.1)
+        try:
+            expected = best(problem, [words_of(problem, row) for row in problem.groups["default"]])
+        except TooLarge:
+            pytest.skip("the brute force would take too long")
+        found = answer(problem)
+        assert (found is None) == (expected is None)
+        if found is not None:
+            one = found.alignment
+            assert found.optimal
+            assert one.tolerance == expected[0]
+            assert one.omega == pytest.approx(expected[1], abs=2e-6)
+            assert (one.pieces, one.count) == expected[2:4]
+            if not one.candidate.unsized:
+                assert abs(one.sigma - problem.canvas) == pytest.approx(expected[4], abs=2e-6)
+
+    def test_unoccludable_lets_nothing_above(self):
+        rules = {"A": Rule(2), "B": Rule(2, unoccludable=True), "C": Rule(2), "t": Rule(2)}
+        nodes = [Substituted(parse("ctc"), (("c", parse("C")),)), parse("ABA")]
+        assert columns(answer(direction(nodes, 6.0, rules)).alignment)[0] == ["C", "t", "C"]
+        with pytest.raises(Infeasible, match=r"layer.*unoccludable"):
+            solve_direction(direction([parse("CCC"), parse("BBB")], 6.0, rules), 30.0)
+
+    def test_an_infeasible_layer_is_named(self):
+        with pytest.raises(Infeasible, match=r"layer 'layer 1' \(pattern 'P1'\) has no word"):
+            solve_direction(direction([parse("AA"), parse("AAA")], 100.0), 30.0)
+
+    def test_the_time_limit_is_kept_and_says_so(self):
+        rules = {**WORKED, "u": Rule(None, transparent=True), "v": Rule(None, transparent=True)}
+        nodes = [parse("(uAvB)^k(uA)^m"), parse("(A|BC)^n(vBu)^m"), parse("(ABC)^k")]
+        ranges = {name: (0, 60) for name in "kmn"}
+        problem = direction(nodes, 60.0, rules, ranges)
+        start = time.process_time()
+        found = answer(problem, 2.0)
+        assert time.process_time() - start < 8.0
+        assert found is None or not found.optimal or found.gap == 0.0
+
+
+class TestSizing:
+    @pytest.mark.parametrize("seed", range(40))
+    def test_equals_a_reference_programme(self, seed):
+        from scipy.optimize import lsq_linear
+
+        problem = random_direction(random.Random(seed), letters=4, layers=2, unsized=0.0)
+        found = answer(problem)
+        if found is None:
+            pytest.skip("no layout")
+        solved = sizing.solve(problem, [found.alignment])
+        equations = sizing.system(problem, [found.alignment])
+        x = np.array([solved.sizes[n] for n in equations.names] + list(solved.pieces.values()))
+        x = x / problem.canvas
+        assert np.allclose(equations.matrix @ x, equations.right, atol=1e-10)
+        assert np.all(x >= equations.least - 1e-10)
+        heavy = np.sqrt(np.where(equations.weight == 1.0, 1.0, 0.0))
+        # Equalities by elimination, then bounds by an independent bounded least squares.
+        null = np.linalg.svd(equations.matrix)
+        rank = int(np.sum(null[1] > 1e-10))
+        basis = null[2][rank:].T
+        if not basis.size or np.any(x <= equations.least + 1e-9):
+            return
+        base = np.linalg.lstsq(equations.matrix, equations.right, rcond=None)[0]
+        free = lsq_linear(heavy[:, None] * basis, heavy * (equations.wish - base)).x
+        reference = base + basis @ free
+        if np.all(reference >= equations.least):
+            sized = equations.weight == 1.0
+            assert np.allclose(x[sized], reference[sized], atol=1e-8)
+
+    def test_no_sizing_is_refused(self):
+        problem = direction([parse("A"), parse("AB")], 5.0)
+        found = answer(problem)
+        assert found is None or columns(found.alignment) != [["A"], ["AB"]]
+
+
+def test_an_unknown_counter_is_refused():
+    from facade_tools.artifacts.design import Canvas, Design, DesignLayer, DesignSymbol
+    from facade_tools.layering.stack import stack_of
+
+    design = Design(Canvas(6, 3), {"A": DesignSymbol(1.0)}, {"P": "A^k"}, (DesignLayer("P", "P"),))
+    with pytest.raises(InvalidInput, match="counter 'k'"):
+        stack_of(design)

@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+import io
 import json
+import re
 import resource
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from facade_tools.errors import InvalidInput
+from facade_tools.formats import cityjson_reader, geojson
+from facade_tools.formats.reading import ReadOptions
 
 from .city_sources import City, flat_box, gable_house
 
@@ -74,8 +83,6 @@ def test_an_id_that_stands_twice_is_refused(facade, tmp_path) -> None:
 
 def test_memory_does_not_grow_with_the_stream(tmp_path) -> None:
     """Ten times the buildings take little more memory: only their vertices' and ids' share."""
-    from facade_tools.formats import cityjson_reader
-    from facade_tools.formats.reading import ReadOptions
 
     def peak(count: int) -> int:
         city = City()
@@ -93,3 +100,33 @@ def test_memory_does_not_grow_with_the_stream(tmp_path) -> None:
 
     peak(100)
     assert peak(1500) < 20_000  # KiB
+
+
+MODEL = json.dumps(City().add("h", gable_house(12.0, 8.0, 5.5, 35.0)).document())
+MAP = json.dumps(
+    {
+        "type": "FeatureCollection",
+        "features": [
+            {
+                "type": "Feature",
+                "properties": {"building": "yes", "height": "7"},
+                "geometry": {"type": "Polygon", "coordinates": [[[0, 0], [9, 0], [9, 9], [0, 0]]]},
+            }
+        ],
+    }
+)
+WORDS = re.compile(r"-?\d+(\.\d+)?|\"[^\"]*\"|\[|\]|\{|\}")
+BROKEN = ("null", "-1", "1e400", "[]", "{}", '"x"', "999999999999", "", "true", "[[[]]]")
+
+
+@given(st.sampled_from([MODEL, MAP]), st.integers(0, 10**6), st.sampled_from(BROKEN))
+@settings(max_examples=150, deadline=None)
+def test_a_broken_file_is_refused_and_never_crashes(text: str, place: int, word: str) -> None:
+    found = list(WORDS.finditer(text))
+    spot = found[place % len(found)]
+    data = (text[: spot.start()] + word + text[spot.end() :]).encode()
+    reader = cityjson_reader if text == MODEL else geojson
+    options = ReadOptions(metres=True)
+    with suppress(InvalidInput):
+        for record in reader.records(io.BytesIO(data), options):
+            reader.build(record, options)

@@ -125,7 +125,7 @@ def _row(line: bytes) -> list[str]:
 
 def _columns(mapping: Mapping[str, Any] | None, header: Sequence[str]) -> Columns:
     if mapping is None:
-        if {AMES.id, AMES.main_area} <= set(header):
+        if _named(AMES) <= set(header):
             return AMES
         raise InvalidInput("a table of unknown columns; name them with --columns MAPPING.yaml")
     columns = parse_columns(mapping)

@@ -196,7 +196,10 @@ def _grouped(
             continue
         done = _take(name, item, root, waiting, root_of, orphans)
         if done:
-            yield _model(root, waiting.pop(root), frame, vertices)
+            members = waiting.pop(root)
+            for member in members:
+                root_of.pop(member, None)
+            yield _model(root, members, frame, vertices)
     for root, members in waiting.items():
         yield _model(root, members, frame, vertices)
 

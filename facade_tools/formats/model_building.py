@@ -85,9 +85,10 @@ def _refuse_implausible(model: Model) -> None:
         raise InvalidInput("no surfaces; expected a building with LoD1, LoD2 or LoD3 geometry")
     if len(surfaces) > MOST_SURFACES:
         raise InvalidInput(f"{len(surfaces)} surfaces; expected at most {MOST_SURFACES}")
-    low, high = bounds(surfaces)
-    if not np.isfinite(low).all() or not np.isfinite(high).all():
+    everything = bounds([*surfaces, *(s for part in model.outside for s in part)])
+    if not np.isfinite(everything).all():
         raise InvalidInput("a coordinate is no finite number")
+    low, high = bounds(surfaces)
     size = high - low
     if size[2] > HIGHEST or max(size[:2]) > LARGEST:
         text = " × ".join(f"{value:.0f}" for value in size)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -52,7 +53,7 @@ def records(models: Models) -> Iterator[Record]:
 def _outbuildings(models: Models) -> tuple[Outbuildings, set[str]]:
     coded: list[tuple[Model, str]] = []
     small: list[Model] = []
-    large: list[tuple[float, ...]] = []
+    large = array("d")  # x0, y0, x1, y1 of each
     for model in models():
         if isinstance(model, InvalidInput) or not model.surfaces:
             continue
@@ -64,7 +65,7 @@ def _outbuildings(models: Models) -> tuple[Outbuildings, set[str]]:
         else:
             low, high = bounds(model.surfaces)
             shift = np.array(model.origin)
-            large.append((*(low + shift)[:2].tolist(), *(high + shift)[:2].tolist()))
+            large.extend([*(low + shift)[:2].tolist(), *(high + shift)[:2].tolist()])
     near = adjoining(small, large) if small and large else []
     return Outbuildings([*coded, *((model, "garage") for model in near)]), {m.id for m in near}
 

@@ -75,12 +75,12 @@ def placed_plan(model: Model) -> BaseGeometry:
     return shapely.transform(footprint(model), lambda points: points + offset)
 
 
-def adjoining(small: Iterable[Model], boxes: list[tuple[float, ...]]) -> list[Model]:
+def adjoining(small: Iterable[Model], boxes: Iterable[float]) -> list[Model]:
     """Return the small models whose bounding box is near that of a larger building.
 
-    boxes: x0, y0, x1, y1 of the larger buildings in the source's coordinates, metres.
+    boxes: x0, y0, x1, y1 of each larger building in the source's coordinates, metres.
     """
-    rows = np.array(boxes, dtype=np.float64).reshape(-1, 4)
+    rows = np.fromiter(boxes, dtype=np.float64).reshape(-1, 4)
     tree = shapely.STRtree([shapely.box(*row) for row in rows])
     return [
         model

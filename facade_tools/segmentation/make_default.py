@@ -12,7 +12,7 @@ from .classifier import Classifier
 from .painting import render_facade
 from .training import Pair, TrainOptions, train
 
-GRAMMARS = ("haussmann", "haussmann-floors")
+GRAMMARS = ("haussmann", "haussmann-floors", "plain")
 HEIGHT = 288  # pixels, the working resolution
 
 
@@ -22,11 +22,11 @@ def rendered_pairs(count: int, seed: int) -> Iterator[Pair]:
     for number in range(count):
         rng = item_generator(seed, "render", number)
         width = int(rng.integers(90, 330))
-        _, picture, labels = render_facade(grammars[number % 2], width, HEIGHT, rng=rng)
+        _, picture, labels = render_facade(grammars[number % len(grammars)], width, HEIGHT, rng=rng)
         yield Pair(f"rendered-{number}", picture, labels)
 
 
-def make_default(count: int = 90, seed: int = 0) -> Classifier:
+def make_default(count: int = 72, seed: int = 0) -> Classifier:
     """Return the classifier trained on `count` rendered facades."""
     pairs = list(rendered_pairs(count, seed))
     rng: np.random.Generator = item_generator(seed, "default-classifier")

@@ -244,6 +244,9 @@ def _clutter(
             left = 0 if rng.random() < 0.6 else x
             factor[y : y + thick, left : left + int(rng.integers(20, width + 21))] *= gain
             factor[y + thick : y + thick + 1, left:] *= np.float32(0.85)
+            if rng.random() < 0.4:  # dentils
+                step = int(rng.integers(2, 6))
+                factor[y : y + thick + 2, left::step] *= np.float32(rng.uniform(0.7, 0.95))
         else:
             factor[y : y + int(rng.integers(10, height)), x : x + thick] *= gain
     factor += np.float32(rng.uniform(0, 0.06)) * _noise((height, width), 3.0, rng)[:, :, 0]

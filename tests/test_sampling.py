@@ -52,6 +52,9 @@ def assert_possible(a: Attributes) -> None:
     assert m.arf[0] >= m.arf[1] >= m.arf[2] >= 0
     assert sum(m.arf) == pytest.approx(1)
     assert m.bdry * np.sqrt(m.bcr * w * d) >= 2 * (w + d) * (1 - 1e-9)
+    floors = 1 + (m.arf[1] > 0) + (m.arf[2] > 0)
+    assert h > (floors - 0.5) * a.storey_height
+    assert floors == 3 or h <= (floors + 0.5) * a.storey_height
     px, py, gw, gd, gh, exposure = m.garage
     if gw:
         assert gw / w / 2 - 1e-9 <= px <= 1 - gw / w / 2 + 1e-9

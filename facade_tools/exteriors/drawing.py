@@ -17,6 +17,7 @@ from .density import log_density
 from .groups import GROUPS, Group
 from .neighbours import Neighbours
 from .network import Network
+from .physical import storey_heights
 from .sampling import draw_block
 from .serialisation import network_of
 
@@ -83,7 +84,7 @@ def sample_attributes(
     done = 0
     for block in chosen if n else ():
         rows = block.take(np.arange(min(len(block.style), n - done)))
-        yield from annotated(rows, done, network, model, finder, given, options)
+        yield from annotated(rows, done, finder, model.storey_height, given, options)
         done += len(rows.style)
         if done >= n:
             return
@@ -158,20 +159,19 @@ def spread(points: Floats, others: Floats | None, distance: float, most: int) ->
 def annotated(
     block: Block,
     first: int,
-    network: Network,
-    model: Model,
     finder: Neighbours,
+    height: float,
     given: Attributes | None,
     options: SampleOptions,
 ) -> Iterator[Attributes]:
-    """Yield rows as artifacts, their ids counted from `first`."""
+    """Yield rows as artifacts, ids counted from `first`; height: of a typical storey, metres."""
     count = len(block.style)
     ids = tuple(f"{options.prefix}-{first + i}" for i in range(count))
     rows = replace(block.readings, ids=ids)
     near = list(finder.nearest(rows)) if options.neighbours else []
-    heights = np.full(count, model.storey_height)
+    heights = storey_heights(rows.values, finder.network.layout, height)
     density, style = block.density.tolist(), block.style.tolist()
-    for i, row in enumerate(write_attributes(rows, network.layout, heights, options.groups)):
+    for i, row in enumerate(write_attributes(rows, finder.network.layout, heights, options.groups)):
         names = {name: finder.ids[index[i]] for name, index, _ in near if index[i] >= 0}
         note = Sample(style[i], density[i], names, block.effective)
         whole = row if given is None else overlaid(row, given)

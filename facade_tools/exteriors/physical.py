@@ -45,6 +45,21 @@ def no_second_floor(values: tuple[Floats, ...], layout: Layout) -> None:
         r2[np.abs(r1) <= ATOM_TOLERANCE] = ABSENT
 
 
+def storey_heights(values: tuple[Floats, ...], layout: Layout, typical: float) -> Floats:
+    """Return a storey height (n,) for each row, metres: `typical`, moved to suit its floors.
+
+    Floor i exists where the house reaches above (i + 1/2) storeys, so that a house of N floors is
+    (N − 1/2) to (N + 1/2) storeys high; with three floors it may be higher.
+    """
+    found = Columns(values, layout).get("height", "r1", "r2")
+    if not found:
+        return np.full(len(values[0]), typical)
+    height, r1, r2 = found
+    floors = 1 + (r1 > ATOM_TOLERANCE) + (np.isfinite(r2) & (r2 > ATOM_TOLERANCE))
+    least = np.where(floors < 3, height / (floors + 0.5), 0.0) * (1 + 1e-6)
+    return np.asarray(np.clip(typical, least, height / (floors - 0.5) * (1 - 1e-6)))
+
+
 def settle(
     values: tuple[Floats, ...], layout: Layout, fixed: tuple[Bits, ...] | None = None
 ) -> None:

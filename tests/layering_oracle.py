@@ -1,3 +1,4 @@
+# ruff: noqa: B905, C901, E501
 """An independent, slow reading of what CONTRACT.md says `layer-solve` minimises.
 
 Words are enumerated outright, every partition is built column by column, linear programmes give

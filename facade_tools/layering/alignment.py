@@ -6,6 +6,7 @@ import heapq
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache
 from itertools import count, pairwise
 from typing import Any
 
@@ -104,6 +105,18 @@ def names_of(alignment: Alignment) -> tuple[Any, ...]:
 def full_key(alignment: Alignment, canvas: float) -> Key:
     """Return the whole order, names included."""
     return (*key_of(alignment, canvas)[:4], names_of(alignment))
+
+
+@cache
+def prepare() -> None:
+    """Load or compile the search before a clock starts: the first time ever takes seconds."""
+    letter = np.array([[0, 1, 0, 0, 1]], np.int64)
+    one = np.array([1], np.int64)
+    limits = np.array([0, 1, 1, 0, 100, 0, 0, 0], np.int64)
+    kernels.search(
+        np.array([0, 1], np.int64), one, one, letter, np.ones((1, 1), np.int64),
+        np.array([1], np.uint64), np.zeros(0, np.uint64), limits, np.array([8, 8], np.int64),
+    )  # fmt: skip
 
 
 class Aligner:

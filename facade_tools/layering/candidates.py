@@ -160,7 +160,7 @@ class Generator:
         bounds = self.bounds(words)
         least = LEAST_UNSIZED * self.canvas
         names = sorted({name for row in bounds for name, _ in row.counts})
-        box = {name: (least, self.limit) for name in names}
+        box = dict.fromkeys(names, (least, self.limit))
         for _ in range(len(names) + 1):
             for row in bounds:
                 if not _tighten(row, box, self.slack):

@@ -253,8 +253,8 @@ def picture(drawing: Drawing, zoom: int = 2) -> Picture:
     page = np.full((height * zoom, width * zoom, 3), 255, dtype=np.uint8)
     for item in drawing.items:
         _paint(page, item, zoom)
-    small: Picture = cv2.resize(page, (width, height), interpolation=cv2.INTER_AREA)
-    return small
+    small = cv2.resize(page, (width, height), interpolation=cv2.INTER_AREA)
+    return np.asarray(small, dtype=np.uint8)
 
 
 def _paint(page: Picture, item: Primitive, zoom: int) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -61,7 +62,7 @@ def _columns(
     spans: Mapping[str, tuple[float, float]] = {**sizes, **box}
     held = [(0.0, 0.0)] * len(candidate.words)
     out = []
-    for start, end in zip(borders, borders[1:], strict=False):
+    for start, end in pairwise(borders):
         asks = {}
         for row, word in enumerate(candidate.words):
             if start[row] != end[row] or start[row].inside:
@@ -245,7 +246,7 @@ class _Programme:
             b_eq=np.array([value for _, value in equal]) if equal else None,
             bounds=ends,
         )
-        if result.status != 0:
+        if result.status != 0 or result.x is None:
             return None
         found = np.clip(result.x[: len(names)], *np.array(ends[: len(names)]).T)
         return dict(zip(names, found.tolist(), strict=True))

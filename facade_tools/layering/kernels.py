@@ -32,7 +32,7 @@ _MIX = np.uint64(0x9E3779B97F4A7C15)
 
 
 @compiled
-def search(
+def search(  # noqa: C901 - one flat loop: a compiled call a row would cost more than the row
     starts: Array,  # (m + 1,) first letter of each row in the flat arrays
     low: Array,  # (letters,) least size
     high: Array,  # (letters,) greatest size
@@ -145,7 +145,7 @@ def search(
                         bottom, top = np.int64(0), np.int64(0)
                         if inside and end == q:
                             cap = high[q] - reach[label, r, 1]
-                            pieces = 1
+                            pieces = np.int64(1)
                         else:
                             start = q
                             if inside:
@@ -203,7 +203,7 @@ def _row_order(m: int, starts: Array, solid: Array) -> Any:
 
 
 @compiled
-def _power_of_two(n: int) -> int:
+def _power_of_two(n: int) -> Any:
     size = 16
     while size < n:
         size *= 2
@@ -211,7 +211,7 @@ def _power_of_two(n: int) -> int:
 
 
 @compiled
-def _slot(codes: Array, code: Array, slots: Array) -> int:
+def _slot(codes: Array, code: Array, slots: Array) -> Any:
     """Return where `code` is or belongs in the open-addressing table of states."""
     mask = len(slots) - 1
     value = np.uint64(1469598103934665603)
@@ -234,7 +234,7 @@ def _slot(codes: Array, code: Array, slots: Array) -> int:
 @compiled
 def _beam_bar(
     state: int, chain: Array, head: Array, labels: Array, beam: int, status: Array
-) -> int:
+) -> Any:
     """Return the Ω above which labels of a bucket are dropped by the beam."""
     none = np.int64(2**62)
     if beam <= 0:
@@ -392,10 +392,7 @@ def _is_forbidden(
     m: int, starts: Array, code: Array, ends: Array, opens: Array, keys: Array, forbidden: Array
 ) -> bool:
     value = column_hash(m, starts, code, ends, opens, keys)
-    for k in range(len(forbidden)):
-        if forbidden[k] == value:
-            return True
-    return False
+    return bool(np.any(forbidden == value))
 
 
 @compiled
@@ -423,7 +420,7 @@ def _add_label(
         at = starts[r] + (codes[target, r] >> 2) + ((codes[target, r] >> 1) & 1) + r
         rest = max(rest, prefix_low[starts[r + 1] + r] - prefix_low[at])
     full = sigma + rest >= limits[CANVAS]
-    other, before = head[target], np.int64(-1)
+    other = head[target]
     while other >= 0:
         if not labels[other, ALIVE]:
             other = labels[other, NEXT]
@@ -432,7 +429,6 @@ def _add_label(
             return
         if _better(fresh, other, m, labels, reach, codes, full, limits):
             labels[other, ALIVE] = 0
-        before = other
         other = labels[other, NEXT]
     labels[fresh, NEXT], labels[fresh, ALIVE] = head[target], 1
     head[target] = fresh
@@ -488,7 +484,7 @@ def _lexically_less(a: int, b: int, m: int, labels: Array, codes: Array) -> bool
 def _best(
     state: int, chain: Array, head: Array, labels: Array, codes: Array, starts: Array,
     limits: Array, status: Array,
-) -> int:  # fmt: skip
+) -> Any:  # fmt: skip
     """Return the best complete label, or -1."""
     best = -1
     m = len(starts) - 1
@@ -511,7 +507,7 @@ def _best(
 
 
 @compiled
-def _lifted(a: int, labels: Array, limits: Array) -> int:
+def _lifted(a: int, labels: Array, limits: Array) -> Any:
     """Return a label's Ω, and what it must grow by for Σ to reach its floor.
 
     The topmost word reaches the floor; with unsized symbols Σ is only a lower bound, and every

@@ -92,7 +92,10 @@ class RowMaker:
         tally = np.zeros((len(letters), len(ranges)), np.int64)
         places = {name: i for i, name in enumerate(sorted(ranges))}
         tally[np.arange(len(letters)), [places[name] for name in letters]] = 1
-        flags = [self.flags(word) + self._shift(start) for word, start in zip(distinct, starts)]
+        flags = [
+            self.flags(word) + self._shift(start)
+            for word, start in zip(distinct, starts, strict=False)
+        ]
         return Rows(
             starts,
             np.array([ranges[name][0] for name in letters], np.int64),

@@ -160,4 +160,5 @@ def _asset(name: str, entry: Mapping[str, Any]) -> Asset:
 
 def _unit(vertices: Floats) -> Floats:
     low, high = vertices.min(axis=0), vertices.max(axis=0)
-    return (vertices - low) / np.maximum(high - low, 1e-12)
+    unit: Floats = (vertices - low) / np.maximum(high - low, 1e-12)
+    return unit

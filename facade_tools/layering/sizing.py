@@ -69,8 +69,8 @@ class _Builder:
         ]
         pieces = [(i, r, k, j) for i, r, k, columns in self.splits for j in columns]
         self.place: dict[str | Piece, int] = {}
-        for key in [*self.names, *pieces]:
-            self.place[key] = len(self.place)
+        keys: list[str | Piece] = [*self.names, *pieces]
+        self.place.update({key: at for at, key in enumerate(keys)})
         self.pieces: list[Piece] = pieces
         self.rows: dict[tuple[int, bytes], tuple[Floats, float, Tag]] = {}
 

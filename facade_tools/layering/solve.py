@@ -10,9 +10,9 @@ from itertools import islice, product
 from ..artifacts.design import Canvas, Design
 from ..artifacts.layout import Group, Layout
 from ..errors import Infeasible
-from .alignment import full_key
-from .explain import explanation
+from .alignment import full_key, prepare
 from .evaluation import evaluate
+from .explain import explanation
 from .language import counters_of, symbols_of
 from .problem import Alignment, Direction
 from .search import Answer, Clock, GroupSearch
@@ -51,6 +51,7 @@ def solve_design(
     Raises InvalidInput where the design means nothing, Infeasible where it has no layout.
     """
     stack = stack_of(design)
+    prepare()
     start = time.monotonic()
     x = solve_direction(stack.direction("x", width), time_limit / 2)
     y = solve_direction(stack.direction("y", height), time_limit - (time.monotonic() - start))
@@ -59,6 +60,7 @@ def solve_design(
 
 def solve_direction(direction: Direction, time_limit: float = TIME_LIMIT) -> Solved:
     """Return the solution of one direction. Raises Infeasible, with what is in conflict."""
+    prepare()
     clock = Clock(time.monotonic() + time_limit)
     answers: dict[str, Answer] = {}
     for groups in components(direction):

@@ -1,0 +1,106 @@
+"""How long `layer-solve` takes, and how far it agrees with the brute force of the tests.
+
+Usage: python benchmarks/bench_layer_solve.py [--oracle N] [--hard] — seconds of CPU time.
+"""
+
+from __future__ import annotations
+
+import argparse
+import random
+import sys
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "tests"))
+
+from layering_oracle import TooLarge, best, random_direction, words_of  # noqa: E402
+
+from facade_tools.artifacts.store import read_one  # noqa: E402
+from facade_tools.layering.language import parse  # noqa: E402
+from facade_tools.layering.problem import Direction, LayerPattern, Rule  # noqa: E402
+from facade_tools.layering.search import Clock, GroupSearch  # noqa: E402
+from facade_tools.layering.solve import solve_design  # noqa: E402
+
+PAPER_26_LAYERS = 1.0  # seconds, IMAW15
+
+
+def samples() -> None:
+    print(f"{'design':24} {'ms':>8} {'limit':>6}  optimal")
+    for path in sorted((ROOT / "sample_data" / "designs").glob("*.yaml")):
+        design = read_one(str(path), "design")
+        solve_design(design)
+        times = []
+        for _ in range(5):
+            start = time.process_time()
+            layout = solve_design(design)
+            times.append(time.process_time() - start)
+        median = sorted(times)[2]
+        proved = all(g.optimal for g in [*layout.x.values(), *layout.y.values()])
+        limit = 100 if path.stem == "concert-hall" else 250
+        print(f"{path.stem:24} {1000 * median:8.1f} {limit:6}  {proved}", end="")
+        ratio = f"  {PAPER_26_LAYERS / median:.0f}x the paper's speed"
+        print(ratio if path.stem == "concert-hall" else "")
+
+
+def hard(seconds: float) -> None:
+    """Answer under-constrained designs: free counters, alternations, very different sizes."""
+    proved = answered = 0
+    for seed in range(30):
+        problem = underconstrained(random.Random(seed))
+        start = time.process_time()
+        answer = GroupSearch(problem, ("default",), Clock(time.monotonic() + seconds)).answer()
+        spent = time.process_time() - start
+        answered += answer is not None
+        proved += answer is not None and answer.optimal
+        what = "none" if answer is None else f"{answer.alignment.omega:.3f} {answer.optimal}"
+        print(f"under-constrained {seed:2}: {spent:6.2f} s  error {what}", flush=True)
+    print(f"answered {answered} of 30, proved optimal {proved}")
+
+
+def underconstrained(rng: random.Random) -> Direction:
+    """Return a problem of 3 or 4 layers with 2 or 3 free counters and sizes from 0.3 to 8 m."""
+    rules = {n: Rule(round(rng.choice([0.3, 0.7, 1.1, 1.9, 3.1, 5.3, 8.0]), 2)) for n in "ABCDE"}
+    rules["t"] = Rule(round(rng.uniform(0.5, 6), 1), transparent=True)
+    rules["u"] = Rule(None, transparent=True)
+    shapes = ["A(BA)^k", "(AB)^kC(AB)^m", "D(C|E)^m", "t(Dt)^n", "uC^nu", "(A|BC)^k", "(tB)^mt"]
+    rows = rng.sample(shapes, rng.randint(2, 3))
+    layers = [LayerPattern(f"L{i}", text, parse(text)) for i, text in enumerate([*rows, "A^kB^m"])]
+    counters = dict.fromkeys("kmn", (0, 60))
+    return Direction(
+        "x", rng.choice([12.0, 20.0, 30.0]), rules, {"default": tuple(layers)}, counters
+    )
+
+
+def oracle(count: int) -> None:
+    """Compare Ω, µ, pieces and columns of random small designs with the brute force."""
+    equal = large = different = 0
+    for seed in range(count):
+        problem = random_direction(random.Random(seed), letters=4, layers=3, unsized=0.1)
+        try:
+            expected = best(problem, [words_of(problem, row) for row in problem.groups["default"]])
+        except TooLarge:
+            large += 1
+            continue
+        found = GroupSearch(problem, ("default",), Clock(time.monotonic() + 60)).answer()
+        one = None if found is None else found.alignment
+        mine = one and (one.tolerance, round(one.omega, 6), one.pieces, one.count)
+        theirs = expected and (expected[0], round(expected[1], 6), *expected[2:4])
+        same = mine == theirs
+        equal, different = equal + same, different + (not same)
+        if not same:
+            print(f"seed {seed}: brute force {theirs}, solver {mine}")
+    print(f"{count} designs: {equal} equal, {different} different, {large} too large")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--oracle", type=int, default=0, help="random designs to compare")
+    parser.add_argument("--hard", action="store_true", help="30 under-constrained designs")
+    parser.add_argument("--seconds", type=float, default=10.0, help="time limit of each of them")
+    options = parser.parse_args()
+    samples()
+    if options.hard:
+        hard(options.seconds)
+    if options.oracle:
+        oracle(options.oracle)

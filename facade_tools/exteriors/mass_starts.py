@@ -11,6 +11,7 @@ import numpy as np
 
 from ..compiled import compiled
 from ..geometry.arrays import Floats, Integers
+from ..geometry.floors import FLOORS
 from .mass_attributes import ARF, GARAGE, GARAGE_AT, GENERAL, PORCH
 from .mass_energy import Target, layout_energy
 from .mass_layout import (
@@ -200,6 +201,27 @@ def _draw_tower(frame: Floats, height: float, rng: np.random.Generator) -> Float
 
 
 @compiled
+def _with_top(target: Target, rng: np.random.Generator) -> Target:
+    """Return the target, its eaves moved to some storey where height and floors disagree.
+
+    A sampled height of 4.4 m and an upper floor contradict each other; 0.1 m more cost less.
+    """
+    storey = target.storey_height
+    wanted = 1 + (target.values[ARF + 1] > 0.01) + (target.values[ARF + 2] > 0.01)
+    low, high = (wanted - 0.5) * storey, (wanted + 0.5) * storey
+    top = target.values[2]
+    known = target.weights[ARF] > 0 and target.weights[2] > 0
+    if not known or (low < top and (top <= high or wanted == FLOORS)):
+        return target
+    floors = 1 + int(rng.random() * FLOORS)
+    values = target.values.copy()
+    values[2] = max(top, (floors - 0.5) * storey + 0.01)
+    if floors < FLOORS:
+        values[2] = min(values[2], (floors + 0.5) * storey)
+    return Target(values, target.weights, storey, target.extra, target.tower, target.zones)
+
+
+@compiled
 def draw_start(
     base: Layout, target: Target, rng: np.random.Generator, work: Work, out: Layout
 ) -> None:
@@ -213,20 +235,21 @@ def draw_start(
         frame[axis] = _draw_origin(base, axis, target.values[axis], rng)
         frame[2 + axis] = frame[axis] + target.values[axis]
     place_parts(out, target, frame)
-    _fill_heights(out, target, rng)
+    hint = _with_top(target, rng)
+    _fill_heights(out, hint, rng)
     xs, ys = _anchor_lines(out, frame, 0, rng), _anchor_lines(out, frame, 1, rng)
     lower = target.tower and rng.random() < 0.8
     if lower:
-        add_box(out, GENERAL, _draw_tower(frame, target.values[2], rng))
+        add_box(out, GENERAL, _draw_tower(frame, hint.values[2], rng))
     locked = holds(base, GENERAL)
     count = min(int(rng.random() ** 1.6 * MOST_DRAWN) + (0 if locked else 1), target.extra)
     tries = TRIES if rng.random() < 0.7 else 1
     for number in range(count):
         highest = number == 0 and not locked and not lower
-        row = _draw_row(xs, ys, target, highest, rng)
+        row = _draw_row(xs, ys, hint, highest, rng)
         least = np.inf
         for _ in range(tries):
-            trial = _draw_row(xs, ys, target, highest, rng)
+            trial = _draw_row(xs, ys, hint, highest, rng)
             k = add_box(out, GENERAL, trial)
             energy = layout_energy(out, target, work)
             out.kinds[k] = EMPTY

@@ -25,7 +25,8 @@ from .mass_search import new_pool, pooled
 log = logging.getLogger("facade_tools.massgen")
 
 POOL = 48
-GRAIN = 1e-3  # generated positions and sizes are rounded to it (m)
+GRAIN = 1e-3  # generated positions and sizes are rounded to it (m) …
+ROUNDING = 1e-6  # … where that costs no more energy than this
 MET = 0.01  # a group whose relative residual is less counts as met
 
 
@@ -96,10 +97,20 @@ def find_masses(
         layout = pooled(pool, k)
         if not known:
             move_to_origin(layout)
+        exact = _mass(layout, known, target, curve)
         round_layout(layout, GRAIN)
-        boxes = boxes_of(layout, known)
-        found.append(Mass(boxes, *mass_energy(boxes, target), curve))
+        rounded = _mass(layout, known, target, curve)
+        # A height a hair above a storey's threshold must not be rounded below it.
+        near = rounded.energy <= 1.5 * exact.energy + ROUNDING
+        found.append(rounded if near else exact)
     return diverse(found, count)
+
+
+def _mass(
+    layout: Layout, known: Sequence[Box], target: Target, curve: tuple[tuple[int, float], ...]
+) -> Mass:
+    boxes = boxes_of(layout, known)
+    return Mass(boxes, *mass_energy(boxes, target), curve)
 
 
 def boxes_of(layout: Layout, known: Sequence[Box]) -> tuple[Box, ...]:

@@ -234,13 +234,14 @@ def side_energy(side: Side, genome: Floats, counts: Integers) -> tuple[float, fl
     value = _term(wwr, side.targets[0]) + _term(sym, side.targets[1])
     value += _term(align, side.targets[2])
     worse = _taste(side, genome, counts, wide)
-    if side.door[0] >= 0 and not _has_door(side, genome, counts):
+    if side.door[0] >= 0 and not has_door(side, genome, counts):
         worse += 1e3 / TASTE
     return value, value + TASTE * worse
 
 
 @compiled
-def _has_door(side: Side, genome: Floats, counts: Integers) -> bool:
+def has_door(side: Side, genome: Floats, counts: Integers) -> bool:
+    """Tell whether the main door found a place: it is the first element of its piece."""
     p = int(side.door[0])
     return bool(counts[p] > 0 and genome[p, 0, SUB] == side.door[3])
 

@@ -124,7 +124,7 @@ def place(side: Side, p: int, sub: int, u: float, row: Floats, count: int) -> in
     """
     width = side.subs[sub, WIDTH]
     lower, tall = _bounds(side, p, sub, u)
-    if count >= MOST or tall < LEAST_HEIGHT or lower + tall > side.pieces[p, 5] - 0.1:
+    if count >= MOST or tall < LEAST_HEIGHT or lower + tall > side.pieces[p, 5] - 0.0999:
         return count
     clear = _free_width(side, p, u, lower, tall)
     least = width if side.subs[sub, DOOR] > 0.0 else SQUEEZE * width

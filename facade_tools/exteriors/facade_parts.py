@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -14,6 +14,8 @@ from ..geometry.blocked import wall_of
 DOOR = (0.95, 2.1)  # a door where the library has none (m)
 DOOR_WEIGHT = 3.0  # doors beside the main one are few: drawn this much more often than counted
 BESIDE_DOOR = 0.25  # least wall between the main door and its piece's border (m)
+OVER_DOOR = 0.1  # least wall over the main door (m)
+LEAST_DOOR = 1.5  # height to which it shrinks where the whole front is low (m)
 USUAL_HEADS = (2.15, 2.1)  # where the library's building has no window (m)
 
 
@@ -119,6 +121,15 @@ def usual_heads(library: Library, entry: LibraryBuilding) -> tuple[float, float]
     return heads[0], heads[1]
 
 
+def fitting_door(rows: Sequence[PartRow], front: Sequence[Piece]) -> list[PartRow]:
+    """Return the substyles with a main door that is no higher than the front allows."""
+    *others, door = rows
+    width = door.width + 2 * BESIDE_DOOR
+    walls = [p.height for p in front if p.origin[2] < 1e-6 and p.width >= width and not p.elements]
+    room = max(walls, default=door.height + OVER_DOOR) - OVER_DOOR
+    return [*others, replace(door, height=max(min(door.height, room), LEAST_DOOR))]
+
+
 def main_doors(
     building: Building, pieces: Sequence[Piece], free: Sequence[bool], rows: Sequence[PartRow]
 ) -> list[MainDoor]:
@@ -131,16 +142,19 @@ def main_doors(
     kinds = {box.id: box.kind for box in building.boxes}
     found = []
     for p, piece in enumerate(pieces):
-        tall = piece.height >= rows[-1].height + 0.1
+        tall = piece.height >= rows[-1].height + OVER_DOOR - 1e-9
         if not free[p] or piece.origin[2] > 1e-6 or piece.width < 2 * half or not tall:
             continue
         porch = _porch_range(building, piece)
         low, high = half, piece.width - half
+        anywhere = MainDoor(p, low, high, sub, 0.3)
         sheltered = porch is not None and max(low, porch[0]) <= min(high, porch[1])
         if porch is not None and sheltered:
             low, high = max(low, porch[0]), min(high, porch[1])
         rank = kinds[piece.box] != "general", not sheltered, -piece.width
         found.append((rank, MainDoor(p, low, high, sub, 0.6 if sheltered else 0.3)))
+        if sheltered:  # should posts and roofs leave no place behind the porch
+            found.append(((rank[0], True, -piece.width), anywhere))
     return [door for _, door in sorted(found, key=lambda row: row[0])]
 
 

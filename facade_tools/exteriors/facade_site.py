@@ -20,6 +20,7 @@ from .facade_layout import (
     GROUND,
     LOW,
     LOWER,
+    SQUEEZE,
     SUB,
     TALL,
     TWIN,
@@ -30,7 +31,7 @@ from .facade_parts import Codes, MainDoor, PartRow
 from .kept import Standing
 from .library import END, storey_of
 
-LOW_ROOM = 1.9  # least height of a piece over its storey's floor that takes windows (m)
+LOW_ROOM = 1.65  # least height of a piece over its storey's floor that takes windows (m)
 NARROW_ROOM = 0.9  # least width of such a piece (m)
 OVER_HEAD = 0.15  # least wall between a window's head and the top of its piece (m)
 NARROW = 0.5  # lower bound of eq. 5, times the average width
@@ -146,7 +147,7 @@ def _add_twins(table: Floats, windows: Sequence[int]) -> None:
     for twin, k in enumerate(windows, start=first):
         table[twin, :4] = table[k, :4]
         table[twin, WIDTH] = max(0.6 * table[k, WIDTH], min(0.45, table[k, WIDTH]))
-        table[twin, TWIN], table[twin, LOW] = -1.0, NARROW * table[k, WIDTH]
+        table[twin, TWIN], table[twin, LOW] = -1.0, SQUEEZE * table[twin, WIDTH]
         table[k, TWIN] = twin
 
 

@@ -15,10 +15,10 @@ from ..geometry.arrays import Floats
 from ..geometry.pieces import facade_pieces
 from .attributes import building_attributes
 from .designed import Designer, designed_pieces
-from .facade_energy import LEAST_TARGET, energy, side_targets, widths
+from .facade_energy import LEAST_TARGET, energy, has_door, side_targets, widths
 from .facade_layout import OPEN
 from .facade_layout import Side as SearchSide
-from .facade_parts import Codes, MainDoor, PartRow, main_doors, part_rows, usual_heads
+from .facade_parts import Codes, MainDoor, PartRow, fitting_door, main_doors, part_rows, usual_heads
 from .facade_site import Solution, facade_of, search_side_of, storey_heads, with_door
 from .garage_doors import garage_doors, garage_sizes
 from .genetic import Search, search_side
@@ -137,8 +137,9 @@ class _Attempt:
 
     def _facades(self, wanted: FacadeAttributes) -> tuple[dict[Side, Facade], float]:
         library = self.shelf.library
-        rows, codes = part_rows(library, self.entry), Codes()
         sides = self._standing(wanted)
+        front = next(side.pieces for side in sides if side.name == "front")
+        rows, codes = fitting_door(part_rows(library, self.entry), front), Codes()
         heads = storey_heads(self.building, sides, usual_heads(library, self.entry))
         facades: dict[Side, Facade] = {}
         excess = 0.0
@@ -183,14 +184,15 @@ class _Attempt:
         self, plain: SearchSide, doors: Sequence[MainDoor], targets: Floats
     ) -> tuple[Solution, int]:
         """Return the best layout of a side over the walls that may take the main door."""
-        best, main = None, -1
+        best, main, homeless = None, -1, True
         for door in doors or [MainDoor()]:
             side, least = with_door(plain, door, targets)
             genome, counts, value = search_side(side, self.options.search, least, rng=self.rng)
-            if best is None or value < best.energy:
+            missing = door.piece >= 0 and not has_door(side, genome, counts)
+            if best is None or (missing, value) < (homeless, best.energy):
                 best = Solution(genome, counts, widths(side, genome, counts), value, least)
-                main = door.piece
-            if value <= least + GOOD:
+                main, homeless = -1 if missing else door.piece, missing
+            if value <= least + GOOD and not missing:
                 break
         assert best is not None
         return best, main

@@ -16,7 +16,8 @@ from .skeleton_check import fault
 from .skeleton_faces import faces_of
 from .skeleton_polish import polished
 from .skeleton_shape import Contour, Skeleton
-from .wavefront import DONE, Edges, Front, propagate, traced, wavefront
+from .wavefront import DONE, propagate
+from .wavefront_front import Edges, Front, traced, wavefront
 
 __all__ = ["Contour", "Skeleton", "SkeletonFailed", "skeleton_by", "straight_skeleton"]
 
@@ -114,12 +115,13 @@ def _propagated(local: Contour, path: _Path) -> tuple[Front, int]:
 
 
 def _displaced(local: Contour, reach: float) -> tuple[Floats, Points2]:
-    """Return offsets (n,) displaced at random by at most `reach`, and the points that fit them.
+    """Return offsets (n,) displaced by at most `reach`, each differently, and points that fit.
 
     Edges in one line move together, all others apart, so that no two events are simultaneous.
     """
     along, normal, offset = local.frames()
-    moves = np.random.default_rng(len(offset)).uniform(-reach, reach, len(offset))
+    golden = np.arange(1, len(offset) + 1) * 0.6180339887498949
+    moves = reach * (2.0 * (golden % 1.0) - 1.0)
     points = np.empty_like(local.points)
     for e, f in enumerate(local.following):
         cross = along[e, 0] * along[f, 1] - along[e, 1] * along[f, 0]

@@ -76,7 +76,7 @@ class GroupSearch:
 
         What the clock cuts off is answered by a beam search, and is not optimal.
         """
-        proved = True
+        proved = cleared = True
         first = self.clock
         self.clock = first.share(0.5)
         for stage in STAGES:
@@ -84,7 +84,11 @@ class GroupSearch:
             proved = proved and found.complete
             if found.alignment is not None:
                 self.clock = first
+                if not found.complete and not first.over(1.0):
+                    found = self._again(stage, found)
+                    proved = found.complete and cleared
                 return self._finished(found, proved)
+            cleared = proved
             if self.clock.over():
                 break
         else:
@@ -92,6 +96,14 @@ class GroupSearch:
             return None if proved else self._rescued(stage)
         self.clock = first
         return self._rescued(stage)
+
+    def _again(self, stage: Stage, before: Found) -> Found:
+        """Search a stage with the time that is left; keep what was known if it is better."""
+        found = self.at(stage)
+        if found.alignment is None or before.alignment is None:
+            return replace(before, complete=False)
+        better = self._before(before.alignment, found.alignment)
+        return replace(before, complete=False) if better else found
 
     def _finished(self, found: Found, proved: bool) -> Answer | None:
         assert found.alignment is not None

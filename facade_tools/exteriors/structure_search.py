@@ -27,6 +27,7 @@ from .styles import Evidence, Rows, Upper
 log = logging.getLogger(__name__)
 
 TOGETHER = Stop(relative=1e-5, iterations=30)
+ROWS_EACH = 10  # rows of the child that each lateral input needs at least
 KNOWN_SHARE = 0.98  # a feature is a parent only where this share of the child's rows knows it
 Inputs = tuple[int, ...]
 
@@ -306,7 +307,8 @@ def _best_edge(
             break
         inputs = tuple(sorted({*state.inputs[g], *options[g][parent]}))
         proposed = (*state.inputs[:g], inputs, *state.inputs[g + 1 :])
-        if inputs == state.inputs[g] or not acyclic(proposed, search.layout):
+        crowded = len(inputs) * ROWS_EACH > _rows(search, g)
+        if crowded or inputs == state.inputs[g] or not acyclic(proposed, search.layout):
             continue
         after = with_edge(search, state, g, inputs)
         gains[(g, parent)] = after.score - state.score
@@ -329,6 +331,11 @@ def pruned(search: Search, state: State) -> State:
         if after.score > state.score:
             state = after
     return state
+
+
+def _rows(search: Search, g: int) -> int:
+    """Return how many rows observe a coordinate of group g."""
+    return int(search.data.groups[g].dense.any(axis=1).sum())
 
 
 def with_edge(search: Search, state: State, g: int, inputs: Inputs) -> State:

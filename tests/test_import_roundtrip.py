@@ -42,6 +42,15 @@ def test_exported_houses_come_back_as_they_were(facade, tmp_path, ending: str) -
     assert rows(back.stdout) == rows(houses)
 
 
+def test_an_imported_building_goes_back_onto_the_map_and_returns(facade, tmp_path) -> None:
+    city = City().add("h", gable_house(12.0, 8.0, 5.5, 35.0), 31.0, (321.5, 45.25, 12.0))
+    city.add("g", flat_box(80.0, 0.0, 83.0, 6.0, 2.6), 31.0)
+    first = facade("import", "-", stdin=json.dumps(city.document()).encode())
+    out = tmp_path / "map.city.json"
+    facade("export", "-", "-o", out, stdin=first.stdout)
+    assert rows(facade("import", out).stdout) == rows(first.stdout)
+
+
 def test_a_model_edited_elsewhere_is_read_by_its_geometry(facade, tmp_path) -> None:
     house = (SAMPLES / "bungalow.jsonl").read_bytes().splitlines()[0]
     out = tmp_path / "house.city.json"

@@ -9,19 +9,21 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 
 from ..artifacts.building import Building, Frame
 from ..artifacts.documents import decode
 from ..artifacts.footprint import Footprint
 from ..errors import InvalidInput
-from ..geometry.arrays import Floats
+from ..geometry.boxes import box_rectangles
+from ..geometry.rectilinear import valid_polygon
 from .model_building import Neighbour, building_of
 from .model_masses import footprint
 from .outbuildings import Outbuildings, adjoining, is_small, kind_of
 from .reading import Built, ReadOptions, Record
 from .surfaces import Model, bounds
 
-SAME_SIZE = 2e-3  # metres
+SAME = 2e-3  # metres
 
 Models = Callable[[], Iterator[Model | InvalidInput]]
 
@@ -44,6 +46,8 @@ def records(models: Models) -> Iterator[Record]:
     for model in models():
         if isinstance(model, InvalidInput):
             yield Record(model, pointer=model.place.pointer)
+        elif model.artifact is not None:
+            yield Record(House(model), pointer=f"/{model.id}")
         elif not kind_of(model.function) and model.id not in small:
             yield Record(House(model, outbuildings.of(model)), pointer=f"/{model.id}")
     for kind in outbuildings.left():
@@ -55,7 +59,7 @@ def _outbuildings(models: Models) -> tuple[Outbuildings, set[str]]:
     small: list[Model] = []
     large = array("d")  # x0, y0, x1, y1 of each
     for model in models():
-        if isinstance(model, InvalidInput) or not model.surfaces:
+        if isinstance(model, InvalidInput) or not model.surfaces or model.artifact is not None:
             continue
         kind = kind_of(model.function)
         if kind:
@@ -90,31 +94,26 @@ def build(record: Record, options: ReadOptions) -> Built:
 def exported(model: Model) -> tuple[Building | Footprint | None, Counter[str]]:
     """Return the artifact that our own export left in a model, if the model still looks like it.
 
-    The walls of both must have the same width, depth and height to 2 mm, so that a model edited
-    elsewhere is read by its geometry.
+    The plans of both must have the same area and perimeter (2 mm along the outline), so that a
+    model edited elsewhere is read by its geometry.
     """
     notes: Counter[str] = Counter()
     if model.artifact is None or not model.surfaces:
         return None, notes
     artifact: Building | Footprint = decode(model.artifact, "building", "footprint")
-    walls = [s for s in model.surfaces if s.meaning == "ground"] or model.surfaces
-    low, high = bounds(walls)
-    if np.abs((high - low)[:2] - _plan_size(artifact)).max() <= SAME_SIZE:
+    seen, stored = footprint(model), _plan(artifact)
+    alike = abs(seen.area - stored.area) <= SAME * stored.length
+    if alike and abs(seen.length - stored.length) <= SAME * (8.0 + 0.1 * stored.length):
         return artifact, notes
     notes["geometry differs from the artifact stored with it: geometry read"] += 1
     return None, notes
 
 
-def _plan_size(artifact: Building | Footprint) -> Floats:
+def _plan(artifact: Building | Footprint) -> BaseGeometry:
     if isinstance(artifact, Footprint):
-        points = np.array([point for ring in artifact.polygon for point in ring])
-    else:
-        mass = [box for box in artifact.boxes if box.kind != "porch"]
-        half = np.array([[box.width, box.depth] for box in mass]) / 2.0
-        middle = np.array([[box.x, box.y] for box in mass])
-        points = np.concatenate([middle - half, middle + half])
-    size: Floats = points.max(axis=0) - points.min(axis=0)
-    return size
+        return valid_polygon([np.array(ring) for ring in artifact.polygon])
+    rectangles = box_rectangles([box for box in artifact.boxes if box.kind != "porch"])
+    return shapely.union_all([shapely.box(*row) for row in rectangles], grid_size=1e-4)
 
 
 def footprint_of(model: Model, options: ReadOptions) -> Footprint:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from ..artifacts.building import Box, Building, Chimney, Element
 from .arrays import Floats, Points2, Points3, Triangles
+from .blocked import porch_posts
 from .detail_boxes import WORLD, Box6, LocalFrame, Parts, meshes_of
 from .detail_roofs import roof_slabs
 from .detail_windows import sash_leaf
@@ -19,7 +19,6 @@ from .triangulate import triangulate_rings
 
 DECK = 0.05  # a porch's floor lies below the door's threshold, metres
 POST = 0.16
-POST_SPACING = 2.6
 BEAM = 0.24
 BAY_DEPTH = 0.6
 
@@ -113,8 +112,7 @@ def porch(name: str, box: Box, building: Building) -> list[Mesh]:
     height = box.height or 2.4
     x0, x1 = box.x - box.width / 2, box.x + box.width / 2
     y0, y1 = box.y - box.depth / 2, box.y + box.depth / 2
-    solids = [other for other in building.boxes if other.kind != "porch"]
-    posts = [p for p in _post_places(x0, y0, x1, y1) if not _covered(p, solids)]
+    posts: list[tuple[float, float]] = porch_posts(building, box).tolist()
     floor: list[Box6] = [(x0, y0, 0.0, x1, y1, DECK)]
     columns: list[Box6] = []
     for x, y in posts:
@@ -140,29 +138,3 @@ def _raised(solid: Solid, floor: float) -> Solid:
     vertices = solid.vertices.copy()
     vertices[:, 2] = np.maximum(vertices[:, 2], floor)
     return replace(solid, vertices=vertices)
-
-
-def _post_places(x0: float, y0: float, x1: float, y1: float) -> list[tuple[float, float]]:
-    """Return places around the plan's edge, spaced evenly, moved in by the post's half."""
-    inset = POST / 2 + 0.04
-    xs, ys = _spaced(x0 + inset, x1 - inset), _spaced(y0 + inset, y1 - inset)
-    rows = [(x, y) for x in xs for y in (ys[0], ys[-1])]
-    sides = [(x, y) for y in ys[1:-1] for x in (xs[0], xs[-1])]
-    return list(dict.fromkeys(rows + sides))
-
-
-def _spaced(low: float, high: float) -> list[float]:
-    if high <= low:
-        return [(low + high) / 2]
-    count = max(2, round((high - low) / POST_SPACING) + 1)
-    return [low + (high - low) * i / (count - 1) for i in range(count)]
-
-
-def _covered(place: tuple[float, float], boxes: Sequence[Box]) -> bool:
-    """Tell whether a post would stand in the house or against its wall."""
-    near = POST + 0.1
-    return any(
-        abs(place[0] - box.x) < box.width / 2 + near
-        and abs(place[1] - box.y) < box.depth / 2 + near
-        for box in boxes
-    )

@@ -11,8 +11,8 @@ import numpy as np
 from ..errors import InvalidInput
 from ..geometry.arrays import Floats
 from ..imaging.image_io import Picture
-from .textured_obj import read_obj
 from .textured import GREY, Paint, TexturedMesh, Textures, joined, read_bytes
+from .textured_obj import read_obj
 
 ENDINGS = (".obj", ".glb", ".gltf", ".ply", ".dae")
 Y_UP = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]], dtype=np.float64)

@@ -255,7 +255,7 @@ def _clutter(
 
 
 def _cornices(canvas: Canvas, tree: Node, style: Style, rng: np.random.Generator) -> None:
-    """Draw ledges below floors and dormer frames in the attic."""
+    """Draw ledges at the borders of floors."""
     height = canvas.shape[0]
     for node in nodes(tree):
         if node.split == "right" and node.symbol in ("FL", "GF") and rng.random() < 0.6:

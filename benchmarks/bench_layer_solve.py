@@ -17,6 +17,7 @@ sys.path.insert(0, str(ROOT / "tests"))
 from layering_oracle import TooLarge, best, random_direction, words_of  # noqa: E402
 
 from facade_tools.artifacts.store import read_one  # noqa: E402
+from facade_tools.layering.alignment import prepare  # noqa: E402
 from facade_tools.layering.language import parse  # noqa: E402
 from facade_tools.layering.problem import Direction, LayerPattern, Rule  # noqa: E402
 from facade_tools.layering.search import Clock, GroupSearch  # noqa: E402
@@ -103,6 +104,7 @@ if __name__ == "__main__":
     parser.add_argument("--hard", action="store_true", help="30 under-constrained designs")
     parser.add_argument("--seconds", type=float, default=10.0, help="time limit of each of them")
     options = parser.parse_args()
+    prepare()
     samples()
     if options.hard:
         hard(options.seconds)

@@ -13,6 +13,7 @@ from layering_oracle import TooLarge, best, random_direction, words_of
 
 from facade_tools.errors import Infeasible, InvalidInput
 from facade_tools.layering import sizing
+from facade_tools.layering.alignment import prepare
 from facade_tools.layering.evaluation import evaluate
 from facade_tools.layering.language import PatternError, Substituted, parse, symbol_pair
 from facade_tools.layering.problem import Candidate, Direction, LayerPattern, Rule, Span
@@ -38,6 +39,7 @@ def direction(nodes, canvas, rules=WORKED, counters=None):
 
 
 def answer(problem, seconds=60.0):
+    prepare()
     return GroupSearch(problem, ("default",), Clock(time.monotonic() + seconds)).answer()
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from . import kernels
+from . import kernels, kernels_labels
 from .candidates import Bounds
 from .evaluation import Borders, Line, crossings, evaluate, least_error, substring_line
 from .problem import SLACK, Alignment, Candidate, Direction, Span
@@ -260,20 +260,20 @@ class Aligner:
         labels, steps = FIRST_LABELS, FIRST_STEPS
         while True:
             capacity = np.array([labels, labels], np.int64)
-            limits[kernels.MAX_STEPS] = steps
+            limits[kernels_labels.MAX_STEPS] = steps
             started = time.monotonic()
             status, codes = kernels.search(
                 rows.starts, rows.low, rows.high, rows.flags, rows.tally, rows.keys,
                 np.array(forbidden, np.uint64), limits, capacity,
             )  # fmt: skip
-            full = max(status[kernels.LABELS], status[kernels.STATES]) >= labels
-            long = status[kernels.STEPS] > steps
+            full = max(status[kernels_labels.LABELS], status[kernels_labels.STATES]) >= labels
+            long = status[kernels_labels.STEPS] > steps
             most = (full and labels >= task.effort.labels) or (long and steps >= task.effort.steps)
             if not (full or long) or most or self.late(GROWTH * (time.monotonic() - started)):
                 break
             labels, steps = labels * (GROWTH if full else 1), steps * (GROWTH if long else 1)
         borders = _decoded(rows, codes) if len(codes) else None
-        return borders, bool(status[kernels.COMPLETE])
+        return borders, bool(status[kernels_labels.COMPLETE])
 
     def _examine(
         self, path: Alignment, node: _Node, task: Task

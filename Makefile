@@ -61,3 +61,4 @@ lock:
 
 clean:
 	rm -rf build dist *.egg-info .venv
+	rm -rf facade_tools/__pycache__/kernels-*

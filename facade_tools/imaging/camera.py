@@ -68,5 +68,6 @@ def fitted(points: Points3, view: View, samples: int = 1, margin: float = 0.06) 
     left_most = np.max(-local[:, :2] - free * local[:, 2:], axis=0)
     centre = (right_most - left_most) / 2
     distance = float(np.max((right_most + left_most) / (2 * free)))
-    eye = np.array([centre[0], centre[1], -max(distance, 1e-3)]) @ axes
+    behind = min(-distance, float(local[:, 2].min()) - 1e-3)
+    eye = np.array([centre[0], centre[1], behind]) @ axes
     return Camera(eye, axes, float(focal), width, height)

@@ -40,14 +40,14 @@ def _kernels_folder() -> Path:
 
 def _use_folder() -> None:
     """Point numba at the folder, unless the user has chosen one or it cannot be written."""
-    if numba.config.CACHE_DIR:
+    if numba.config.CACHE_DIR:  # type: ignore[attr-defined]
         return
     folder = _kernels_folder()
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:  # a read-only installation: numba's own fall-back, the user's cache folder
         return
-    numba.config.CACHE_DIR = str(folder)
+    numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
 
 
 _use_folder()

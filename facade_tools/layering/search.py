@@ -129,8 +129,12 @@ class GroupSearch:
         return a.tolerance, a.pieces > 0, full_key(a, self.direction.canvas)
 
     def _beamed(self, stuck: Stage) -> Alignment | None:
+        """Try beams on every candidate, each stage within its share of the time."""
+        whole = self.clock
+        stages = STAGES[STAGES.index(stuck) :]
         best: Alignment | None = None
-        for stage in STAGES[STAGES.index(stuck) :]:
+        for left, stage in zip(range(len(stages), 0, -1), stages, strict=True):
+            self.clock = whole.share(0.8 / left)
             for candidate in self.candidates(stage.tolerance):
                 budget = stage.tolerance * self.direction.canvas
                 found = self._align(candidate, stage, budget, QUICK)
@@ -139,10 +143,11 @@ class GroupSearch:
                 ):
                     best = found.alignment
                 if self.clock.over():
-                    return best
-            if best is not None or self.clock.over():
-                return best
-        return None
+                    break
+            if best is not None or whole.over():
+                break
+        self.clock = whole
+        return best
 
     def candidates(self, tolerance: float) -> Iterator[Candidate]:
         """Yield the candidates at a tolerance; the first MAX_CANDIDATES are kept."""

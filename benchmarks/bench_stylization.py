@@ -140,7 +140,8 @@ def measure(path: Path) -> str:
         period(facade_render(bigger, "front", blow, bhigh), bscale),
     )
     return (
-        f"{path.parent.name[:34]:34} {len(mesh.faces):6} {len(capture.blocks.blocks):3} {len(faces):5} "
+        f"{path.parent.name[:34]:34} {len(mesh.faces):6} {len(capture.blocks.blocks):3} "
+        f"{len(faces):5} "
         f"{capture.sheet.lost:5.0%} {kept:6.3f} {likeness:6.3f}  "
         f"{periods[0]:6.2f} {periods[1]:6.2f} {periods[2]:6.2f}  "
         f"{read - start:5.2f} {captured - read:5.2f} {done - captured:5.2f}"

@@ -2,40 +2,90 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+import hashlib
+from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from facade_tools.artifacts.documents import encode
 from facade_tools.artifacts.numbers import dump_line
 from facade_tools.artifacts.provenance import Provenance, Source
-from facade_tools.artifacts.store import digest, read_all, read_one
+from facade_tools.artifacts.store import RawItem, digest, read_one, read_raw
 from facade_tools.errors import InvalidInput
+from facade_tools.parallel import map_ordered
 
-from ._report import Progress
+from ._options import StreamOptions
+from ._report import Progress, say_error
 from ._stream import open_sink, write_result
 
 if TYPE_CHECKING:
     from facade_tools.artifacts.attributes import Attributes
     from facade_tools.artifacts.model import Model
 
+RUN = 1000  # samples that one generator draws
 
-def read_attributes(paths: Sequence[str]) -> tuple[list[Attributes], tuple[Source, ...]]:
-    """Return the attribute vectors of mixed streams of buildings and attributes.
 
-    Raises InvalidInput on ids that stand twice.
-    """
+def item_attributes(item: RawItem) -> Attributes:
+    """Return the attribute vector of an item: attributes, or a building turned into them."""
     from facade_tools.exteriors.attributes import building_attributes
 
-    artifacts, sources = read_all(paths, "attributes", "building")
-    rows = [building_attributes(a) if a.kind == "building" else a for a in artifacts]
-    seen: set[str] = set()
-    for row in rows:
-        if row.id in seen:
-            raise InvalidInput(f"id {row.id!r} stands twice; expected unique ids")
-        seen.add(row.id)
-    return rows, sources
+    artifact = item.artifact("attributes", "building")
+    return building_attributes(artifact) if artifact.kind == "building" else artifact
+
+
+@dataclass(frozen=True)
+class Rows:
+    """The attribute vectors of all inputs, a provenance entry an input, and how many were bad."""
+
+    attributes: list[Attributes]
+    sources: tuple[Source, ...]
+    bad: int
+
+    def complain(self) -> None:
+        """Raise InvalidInput if --on-error skip has left something out."""
+        if self.bad:
+            raise InvalidInput(f"{self.bad} bad items were skipped")
+
+
+def read_attributes(stage: str, stream: StreamOptions) -> Rows:
+    """Return the attribute vectors of mixed streams.
+
+    Raises the first error, also on ids that stand twice, unless bad items shall be skipped.
+    """
+    rows: dict[str, Attributes] = {}
+    sources = []
+    bad = 0
+    for path in stream.inputs:
+        running = hashlib.sha256()
+        items = _hashed(read_raw([path]), running)
+        outcomes = map_ordered(item_attributes, items, jobs=stream.jobs, scheduler=stream.scheduler)
+        with closing(outcomes):
+            for outcome in outcomes:
+                error = outcome.error or _add(rows, outcome.value)
+                bad += error is not None
+                if error is not None and stream.on_error == "stop":
+                    raise error
+                if error is not None:
+                    say_error(stage, error)
+        sources.append(Source(RawItem(path, None, b"").provenance().name, running.hexdigest()))
+    return Rows(list(rows.values()), tuple(sources), bad)
+
+
+def _add(rows: dict[str, Attributes], row: Attributes | None) -> Exception | None:
+    if row is None:
+        return None
+    if row.id in rows:
+        return InvalidInput(f"id {row.id!r} stands twice; expected unique ids")
+    rows[row.id] = row
+    return None
+
+
+def _hashed(items: Iterator[RawItem], running: Any) -> Iterator[RawItem]:
+    for item in items:
+        running.update(item.data)
+        yield item
 
 
 def load_model(path: str) -> tuple[Model, Source]:
@@ -50,20 +100,53 @@ def load_model(path: str) -> tuple[Model, Source]:
     return model, digest(path)
 
 
+@dataclass(frozen=True)
+class Drawing:
+    """Draws a run of samples in any process; a run has a generator of its own."""
+
+    model: Model
+    given: Attributes | None
+    provenance: Provenance
+    seed: int
+    style: int | None
+    top: bool
+    min_distance: float
+
+    def runs(self, count: int) -> list[tuple[int, int]]:
+        """Return first index and number of the runs; what looks at all samples is one run."""
+        if self.top or self.min_distance > 0:
+            return [(0, count)]
+        return [(at, min(RUN, count - at)) for at in range(0, count, RUN)] or [(0, 0)]
+
+    def __call__(self, run: tuple[int, int]) -> list[tuple[str, bytes]]:
+        """Return id and bytes of every sample of a run."""
+        from facade_tools.exteriors.drawing import SampleOptions, sample_attributes
+        from facade_tools.randomness import item_generator
+
+        start, count = run
+        rng = item_generator(self.seed, "sample", start)
+        options = SampleOptions(self.style, self.top, self.min_distance)
+        rows = sample_attributes(self.model, count, rng=rng, given=self.given, options=options)
+        return [self._written(row, start + i) for i, row in enumerate(rows)]
+
+    def _written(self, row: Attributes, index: int) -> tuple[str, bytes]:
+        named = replace(row, id=f"{self.seed}-{index}", provenance=self.provenance)
+        return named.id, dump_line(encode(named))
+
+
 def write_samples(
-    rows: Iterable[Attributes],
-    output: str | None,
-    seed: int,
-    options: Mapping[str, Any],
-    sources: tuple[Source, ...],
+    drawing: Drawing, count: int, output: str | None, *, jobs: int, scheduler: str | None
 ) -> None:
-    """Write samples as a stream, each with its provenance."""
-    provenance = Provenance("sample", seed, options, sources)
+    """Write `count` samples as a stream, each with its provenance."""
     progress = Progress("sample")
-    with open_sink(output) as write:
-        for row in rows:
-            write(row.id, dump_line(encode(replace(row, provenance=provenance))))
-            progress.advance()
+    outcomes = map_ordered(drawing, drawing.runs(count), jobs=jobs, scheduler=scheduler)
+    with open_sink(output) as write, closing(outcomes):
+        for outcome in outcomes:
+            if outcome.error is not None:
+                raise outcome.error
+            for identity, data in outcome.value or []:
+                write(identity, data)
+                progress.advance()
     progress.close()
 
 
@@ -79,9 +162,7 @@ def read_given(path: str | None) -> tuple[Attributes | None, tuple[Source, ...]]
 
 
 def run_learn(
-    inputs: Sequence[str],
-    output: str | None,
-    seed: int,
+    stream: StreamOptions,
     variant: Any,
     faithful: bool,
     prior: str | None,
@@ -96,23 +177,28 @@ def run_learn(
     from facade_tools.randomness import item_generator
 
     recorded = {"variant": variant, "faithful": faithful, "restarts": restarts}
+    seed = stream.seed or 0
     rng = item_generator(seed, "learn")
     if groups is not None:
         options = LearnOptions(variant=variant, faithful=faithful, restarts=restarts)
-        model = learn_table(inputs, groups, rng=rng, options=options)
-        sources = (*map(digest, inputs), digest(groups))
+        model = learn_table(stream.inputs, groups, rng=rng, options=options)
+        sources = (*map(digest, stream.inputs), digest(groups))
         rows: list[Attributes] = []
     else:
-        rows, sources = read_attributes(inputs)
-        more, extra = (None, ()) if prior is None else read_attributes([prior])
-        options = LearnOptions(variant, faithful, restarts, prior_rows=more)
+        read = read_attributes("learn", stream)
+        more = read_attributes("learn", replace(stream, inputs=(prior,))) if prior else None
+        rows, sources = read.attributes, read.sources + (more.sources if more else ())
+        options = LearnOptions(
+            variant, faithful, restarts, prior_rows=more.attributes if more else None
+        )
         model = learn_model(rows, rng=rng, options=options)
-        sources += extra
     table = compare(rows, options, holdout, seed) if holdout and rows else ()
     if report is not None:
         write_report(model, rows, table, report, seed)
     provenance = Provenance("learn", seed, recorded, sources)
-    write_result(replace(model, provenance=provenance), output)
+    write_result(replace(model, provenance=provenance), stream.output)
+    if groups is None:
+        read.complain()
 
 
 def compare(rows: list[Attributes], options: Any, splits: int, seed: int) -> Any:

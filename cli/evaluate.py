@@ -9,9 +9,8 @@ from . import _options
 
 @click.command()
 @click.argument("model", metavar="MODEL")
-@_options.inputs("ATTRIBUTES|BUILDINGS...")
-@_options.output
-def command(model: str, inputs: tuple[str, ...], output: str | None) -> None:
+@_options.stream_options("ATTRIBUTES|BUILDINGS...", seeded=False)
+def command(model: str, stream: _options.StreamOptions) -> None:
     """Print the negative log density of buildings under a model: {"n", "nll", "per_building"}.
 
     nll is the mean; nats, over what each building observes: density per metre or per unit in
@@ -27,8 +26,9 @@ def command(model: str, inputs: tuple[str, ...], output: str | None) -> None:
     from ._stream import open_sink
 
     loaded, _ = load_model(model)
-    rows, _ = read_attributes(inputs)
-    values = negative_log_density(loaded, rows).tolist()
+    read = read_attributes("evaluate", stream)
+    values = negative_log_density(loaded, read.attributes).tolist()
     mean = sum(values) / len(values) if values else None
-    with open_sink(output) as write:
+    with open_sink(stream.output) as write:
         write("evaluation", dump_line({"n": len(values), "nll": mean, "per_building": values}))
+    read.complain()

@@ -12,9 +12,7 @@ VARIANTS = ("full", "no-lateral", "no-middle", "flat", "gmm")
 
 
 @click.command()
-@_options.inputs("BUILDINGS|ATTRIBUTES|TABLE.csv...")
-@_options.output
-@_options.seed
+@_options.stream_options("BUILDINGS|ATTRIBUTES|TABLE.csv...")
 @click.option(
     "--variant",
     type=click.Choice(VARIANTS),

@@ -24,6 +24,8 @@ from . import _options
 )
 @_options.output
 @_options.seed
+@_options.jobs
+@_options.scheduler
 def command(
     model: str,
     count: int,
@@ -33,6 +35,8 @@ def command(
     min_distance: float,
     output: str | None,
     seed: int,
+    jobs: int,
+    scheduler: str | None,
 ) -> None:
     """Draw attribute vectors of new buildings from a model (FW16 5, 7), or complete a partial one.
 
@@ -41,15 +45,13 @@ def command(
       facade sample model.json -n 20 --seed 7 -o attributes.jsonl
       facade sample model.json --given partial.yaml --top -n 5
     """
-    from facade_tools.exteriors.drawing import SampleOptions, sample_attributes
-    from facade_tools.randomness import item_generator
+    from facade_tools.artifacts.provenance import Provenance
 
-    from ._learning import load_model, read_given, write_samples
+    from ._learning import Drawing, load_model, read_given, write_samples
 
     loaded, source = load_model(model)
-    options = SampleOptions(style, top, min_distance, prefix=str(seed))
     known, sources = read_given(given)
-    rng = item_generator(seed, "sample")
-    rows = sample_attributes(loaded, count, rng=rng, given=known, options=options)
     recorded = {"style": style, "top": top, "min_distance": min_distance}
-    write_samples(rows, output, seed, recorded, (source, *sources))
+    provenance = Provenance("sample", seed, recorded, (source, *sources))
+    drawing = Drawing(loaded, known, provenance, seed, style, top, min_distance)
+    write_samples(drawing, count, output, jobs=jobs, scheduler=scheduler)

@@ -19,7 +19,7 @@ KEEP = {"keep": True}
 class ModelCoordinate:
     """One free coordinate: standardised = (transform(value) − center) / scale.
 
-    transform: identity, log, logit or log-above-1 (log(value − 1)). floor: least standard
+    transform: identity, log, logit or log-above-1 (log(value − 0.95)). floor: least standard
     deviation, least and most: range, own unit. part: the channel that says whether it exists.
     """
 

@@ -12,6 +12,9 @@ Floats = NDArray[np.float64]
 
 EDGE = 1e-7  # closest approach to the end of an open interval
 LARGEST = 1e6
+# Without it a value just above 1 has an endless slope, and the least standard deviation in its own
+# unit becomes one of many powers of e on the logarithmic scale.
+STEP = 0.05
 
 
 class Transform(NamedTuple):
@@ -45,9 +48,9 @@ TRANSFORMS: dict[str, Transform] = {
         1.0 - EDGE,
     ),
     "log-above-1": Transform(
-        lambda x: np.log(x - 1.0),
-        lambda t: 1.0 + _exp(t),
-        lambda x: -np.log(x - 1.0),
+        lambda x: np.log(x - 1.0 + STEP),
+        lambda t: 1.0 - STEP + _exp(t),
+        lambda x: -np.log(x - 1.0 + STEP),
         1.0 + EDGE,
         LARGEST,
     ),

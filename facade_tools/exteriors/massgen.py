@@ -17,7 +17,7 @@ from .mass_attributes import KINDS
 from .mass_candidates import diverse
 from .mass_energy import Target, layout_of, mass_energy, relative_residuals
 from .mass_hints import search_target
-from .mass_layout import EMPTY, Layout, move_to_origin
+from .mass_layout import EMPTY, GARAGE, GENERAL, Layout, move_to_origin
 from .mass_polish import round_layout
 from .mass_roofs import chimney_of, draw_roof_plan, roofed, with_tower
 from .mass_search import new_pool, pooled
@@ -27,6 +27,7 @@ log = logging.getLogger("facade_tools.massgen")
 POOL = 48
 GRAIN = 1e-3  # generated positions and sizes are rounded to it (m) …
 ROUNDING = 1e-6  # … where that costs no more energy than this
+LEAST_WALL = 2.3  # of a general box where it changes no attribute (m)
 MET = 0.01  # a group whose relative residual is less counts as met
 
 
@@ -95,6 +96,7 @@ def find_masses(
     curve = tuple((int(done), float(f"{energy:.4g}")) for done, energy in rows)
     for k in np.flatnonzero(np.isfinite(pool.energies)).tolist():
         layout = pooled(pool, k)
+        _raise_low_walls(layout, target.storey_height)
         if not known:
             move_to_origin(layout)
         exact = _mass(layout, known, target, curve)
@@ -104,6 +106,20 @@ def find_masses(
         near = rounded.energy <= 1.5 * exact.energy + ROUNDING
         found.append(rounded if near else exact)
     return diverse(found, count)
+
+
+def _raise_low_walls(layout: Layout, storey_height: float) -> None:
+    """Raise general boxes that a person could not enter, in place; no storey comes or goes.
+
+    The attributes say nothing of a box between half a storey and one and a half.
+    """
+    solid = np.isin(layout.kinds, (GENERAL, GARAGE))
+    if not solid.any():
+        return
+    highest = float(layout.rows[solid, 4].max())
+    least = min(LEAST_WALL, highest, 1.5 * storey_height * (1 - 1e-6))
+    low = (layout.kinds == GENERAL) & (layout.locks == 0) & (layout.rows[:, 4] < least)
+    layout.rows[low, 4] = least
 
 
 def _mass(

@@ -17,6 +17,7 @@ from .layout import Layout
 
 MIDDLE = 0.5
 GAP = 1e-3  # how far a porch keeps from the middle line, relative
+LEAST_STOREY = 2.3  # m: below it nobody stands upright
 
 
 class Columns:
@@ -60,8 +61,21 @@ def storey_heights(values: tuple[Floats, ...], layout: Layout, typical: float) -
     return np.asarray(np.clip(typical, least, height / (floors - 0.5) * (1 - 1e-6)))
 
 
-def settle(
-    values: tuple[Floats, ...], layout: Layout, fixed: tuple[Bits, ...] | None = None
+def _raise_eaves(
+    values: tuple[Floats, ...], layout: Layout, fixed: tuple[Bits, ...] | None
+) -> None:
+    """Raise houses, in place, whose storeys would be lower than a person stands."""
+    columns = Columns(values, layout)
+    found = columns.get("height", "r1", "r2")
+    if found:
+        height, r1, r2 = found
+        floors = 1 + (r1 > ATOM_TOLERANCE) + (np.isfinite(r2) & (r2 > ATOM_TOLERANCE))
+        least = LEAST_STOREY * np.maximum(floors - 0.5, 1.0) * (1 + 1e-5)
+        held = Columns(fixed, layout) if fixed else None
+        _put(height, np.maximum(height, least), held, "height")
+
+
+def settle(    values: tuple[Floats, ...], layout: Layout, fixed: tuple[Bits, ...] | None = None
 ) -> None:
     """Move complete rows, in place, to what is possible.
 
@@ -71,6 +85,7 @@ def settle(
     """
     _ranges(values, layout, fixed)
     no_second_floor(values, layout)
+    _raise_eaves(values, layout, fixed)
     columns, held = Columns(values, layout), Columns(fixed or (), layout) if fixed else None
     _garage(columns, held)
     for name, sign in (("porch_front", -1), ("porch_back", 1)):

@@ -60,6 +60,9 @@ def items(paths: Iterable[str], options: ReadOptions) -> Iterator[Item]:
                 yield Item(source, None, None, error.at(file))
 
 
+PROSE = (".md", ".txt", ".html", ".pdf")  # what tells about the data in the same folder
+
+
 def _files(path: str) -> list[str]:
     place = Path(path)
     if path == "-" or not place.is_dir():
@@ -67,7 +70,7 @@ def _files(path: str) -> list[str]:
     return [
         str(entry)
         for entry in sorted(place.iterdir())
-        if entry.is_file() and not entry.name.startswith(".")
+        if entry.is_file() and not entry.name.startswith(".") and entry.suffix not in PROSE
     ]
 
 

@@ -17,7 +17,7 @@ $(VENV)/.ready: requirements.lock pyproject.toml
 
 # --- the main job ---------------------------------------------------------------------------------
 demo: $(VENV)/.ready
-	$(MAKE) --no-print-directory -f examples/demo/Makefile FACADE=$(FACADE) OUT=$(OUT)
+	$(MAKE) --no-print-directory -j2 -f examples/demo/Makefile FACADE=$(FACADE) OUT=$(OUT)
 
 demo-real: $(VENV)/.ready
 	$(MAKE) --no-print-directory -f examples/demo/Makefile FACADE=$(FACADE) OUT=build/demo-real \

@@ -75,7 +75,8 @@ def _raise_eaves(
         _put(height, np.maximum(height, least), held, "height")
 
 
-def settle(    values: tuple[Floats, ...], layout: Layout, fixed: tuple[Bits, ...] | None = None
+def settle(
+    values: tuple[Floats, ...], layout: Layout, fixed: tuple[Bits, ...] | None = None
 ) -> None:
     """Move complete rows, in place, to what is possible.
 

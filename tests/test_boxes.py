@@ -33,7 +33,7 @@ def random_rectangles(rng, most=8):
 @pytest.fixture
 def cases():
     rng = np.random.default_rng(11)
-    return [random_rectangles(rng) for _ in range(1200)]
+    return [random_rectangles(rng) for _ in range(2500)]
 
 
 def test_area_and_perimeter_equal_shapely(cases):

@@ -101,7 +101,7 @@ def union_at(building, height):
 @pytest.fixture
 def cases():
     rng = np.random.default_rng(5)
-    return [random_building(rng) for _ in range(300)]
+    return [random_building(rng) for _ in range(800)]
 
 
 def test_wall_area_equals_the_slices(cases):

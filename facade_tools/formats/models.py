@@ -17,15 +17,25 @@ from ..artifacts.footprint import Footprint
 from ..errors import InvalidInput
 from ..geometry.boxes import box_rectangles
 from ..geometry.rectilinear import valid_polygon
-from .model_building import Neighbour, building_of
+from .model_building import ADJOINS, Neighbour, building_of
 from .model_masses import footprint
-from .outbuildings import Outbuildings, adjoining, is_small, kind_of
+from .model_store import ModelStore, Numbers, PlanBoxes
+from .outbuildings import Outbuildings, is_small, kind_of
 from .reading import Built, ReadOptions, Record
-from .surfaces import Model, bounds
+from .surfaces import Model
 
 SAME = 2e-3  # metres
 
-Models = Callable[[], Iterator[Model | InvalidInput]]
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """Where the models that follow stand in a file of one feature a line."""
+
+    number: int
+    data: bytes
+
+
+Models = Callable[[], Iterator[Model | InvalidInput | Line]]
 
 
 @dataclass(frozen=True)
@@ -40,38 +50,59 @@ def records(models: Models) -> Iterator[Record]:
     """Yield a record for every building; outbuildings go to the house that they adjoin.
 
     `models` reads the file from its start each time it is called: once to find the outbuildings,
-    which stay in memory, once to give them away.
+    which wait on disk, once to give them away.
     """
-    outbuildings, small = _outbuildings(models)
+    outbuildings, numbers = _outbuildings(models)
+    number = -1
+    line: Line | None = None
     for model in models():
+        if isinstance(model, Line):
+            line = model
+            continue
+        number += 1
         if isinstance(model, InvalidInput):
-            yield Record(model, pointer=model.place.pointer)
+            yield _record(model, line, model.place.pointer)
         elif model.artifact is not None:
-            yield Record(House(model), pointer=f"/{model.id}")
-        elif not kind_of(model.function) and model.id not in small:
-            yield Record(House(model, outbuildings.of(model)), pointer=f"/{model.id}")
-    for kind in outbuildings.left():
-        yield Record(Counter({f"{kind} that adjoins no house: left out": 1}))
+            yield _record(House(model), line, f"/{model.id}")
+        elif number not in numbers:
+            yield _record(House(model, outbuildings.of(model)), line, f"/{model.id}")
+    for left in outbuildings.left():
+        if isinstance(left, Model):
+            yield Record(House(left), pointer=f"/{left.id}")
+        else:
+            yield Record(Counter({f"{left} that adjoins no house: left out": 1}))
 
 
-def _outbuildings(models: Models) -> tuple[Outbuildings, set[str]]:
-    coded: list[tuple[Model, str]] = []
-    small: list[Model] = []
-    large = array("d")  # x0, y0, x1, y1 of each
+def _record(payload: House | InvalidInput, line: Line | None, pointer: str) -> Record:
+    if line is None:
+        return Record(payload, pointer=pointer)
+    return Record(payload, line.number, pointer, line.data)
+
+
+def _outbuildings(models: Models) -> tuple[Outbuildings, Numbers]:
+    """Return the outbuildings of a file, and the places of them among its models."""
+    found, numbers = Outbuildings(), Numbers()
+    small, places = ModelStore(), array("q")
+    large = PlanBoxes()
+    number = -1
     for model in models():
-        if isinstance(model, InvalidInput) or not model.surfaces or model.artifact is not None:
+        number += not isinstance(model, Line)
+        if not isinstance(model, Model) or not model.surfaces or model.artifact is not None:
             continue
         kind = kind_of(model.function)
         if kind:
-            coded.append((model, kind))
+            numbers.add(number)
+            found.add(model, kind)
         elif is_small(model):
-            small.append(model)
+            small.add(model)
+            places.append(number)
         else:
-            low, high = bounds(model.surfaces)
-            shift = np.array(model.origin)
-            large.extend([*(low + shift)[:2].tolist(), *(high + shift)[:2].tolist()])
-    near = adjoining(small, large) if small and large else []
-    return Outbuildings([*coded, *((model, "garage") for model in near)]), {m.id for m in near}
+            large.add(number, model)
+    for place, number in enumerate(places):
+        if large.near(model := small[place], ADJOINS):
+            numbers.add(number)
+            found.add(model, "garage", by_size=True)
+    return found, numbers
 
 
 def build(record: Record, options: ReadOptions) -> Built:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+import sys
+from collections.abc import Iterator
 
 import numpy as np
 import shapely
@@ -12,6 +12,7 @@ from shapely.geometry.base import BaseGeometry
 
 from .model_building import ADJOINS, Neighbour
 from .model_masses import footprint
+from .model_store import ModelStore, Numbers, PlanBoxes
 from .surfaces import Model, bounds
 
 # Ends of function codes: of the German cadastre (AdV), and words of other sources.
@@ -40,50 +41,51 @@ def is_small(model: Model) -> bool:
     )
 
 
-@dataclass
 class Outbuildings:
-    """The outbuildings of a file, waiting for their houses."""
+    """The outbuildings of a file, waiting on disk for their houses."""
 
-    models: list[tuple[Model, str]]
-    plans: list[BaseGeometry] = field(default_factory=list)
-    taken: set[int] = field(default_factory=set)
+    def __init__(self) -> None:
+        """Start without any."""
+        self._waiting = ModelStore()
+        self._kinds: list[str] = []
+        self._by_size = Numbers()
+        self._boxes = PlanBoxes()
+        self._taken = bytearray()
 
-    def __post_init__(self) -> None:
-        """Place all plans in the source's coordinates, for the search by distance."""
-        self.plans = [placed_plan(model) for model, _ in self.models]
-        self.tree = shapely.STRtree(self.plans)
+    def add(self, model: Model, kind: str, by_size: bool = False) -> None:
+        """Let an outbuilding wait; all are added before the first house asks.
+
+        by_size: nothing but its size says what it is.
+        """
+        if by_size:
+            self._by_size.add(len(self._waiting))
+        self._boxes.add(len(self._waiting), model)
+        self._waiting.add(model)
+        self._kinds.append(sys.intern(kind))
+        self._taken.append(0)
 
     def of(self, house: Model) -> tuple[Neighbour, ...]:
         """Return the outbuildings that adjoin a house; each goes to the first that asks."""
-        if not self.models:
+        if not house.surfaces:
             return ()
-        plan = placed_plan(house)
-        near = self.tree.query(plan, predicate="dwithin", distance=ADJOINS)
-        fresh = [k for k in sorted(near.tolist()) if k not in self.taken]
-        self.taken.update(fresh)
-        rows = [self.models[k] for k in fresh]
-        return tuple(Neighbour(model, kind) for model, kind in rows if kind != "shed")
+        near = [k for k in self._boxes.near(house, ADJOINS) if not self._taken[k]]
+        found = []
+        plan = placed_plan(house) if near else None
+        for number in near:
+            model = self._waiting[number]
+            if shapely.dwithin(plan, placed_plan(model), ADJOINS):
+                self._taken[number] = 1
+                found.append(Neighbour(model, self._kinds[number]))
+        return tuple(row for row in found if row.kind != "shed")
 
-    def left(self) -> list[str]:
-        """Return the kinds of those that no house took."""
-        return [kind for k, (_, kind) in enumerate(self.models) if k not in self.taken]
+    def left(self) -> Iterator[str | Model]:
+        """Yield what no house took: its kind, or where only its size told it, itself."""
+        for number, (kind, taken) in enumerate(zip(self._kinds, self._taken, strict=True)):
+            if not taken:
+                yield self._waiting[number] if number in self._by_size else kind
 
 
 def placed_plan(model: Model) -> BaseGeometry:
     """Return a model's footprint in the source's coordinates."""
     offset = np.array(model.origin[:2])
     return shapely.transform(footprint(model), lambda points: points + offset)
-
-
-def adjoining(small: Iterable[Model], boxes: Iterable[float]) -> list[Model]:
-    """Return the small models whose bounding box is near that of a larger building.
-
-    boxes: x0, y0, x1, y1 of each larger building in the source's coordinates, metres.
-    """
-    rows = np.fromiter(boxes, dtype=np.float64).reshape(-1, 4)
-    tree = shapely.STRtree([shapely.box(*row) for row in rows])
-    return [
-        model
-        for model in small
-        if len(tree.query(placed_plan(model), predicate="dwithin", distance=ADJOINS))
-    ]

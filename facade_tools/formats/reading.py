@@ -66,6 +66,14 @@ Records = Callable[[BinaryIO, ReadOptions], Iterator[Record]]
 Build = Callable[[Record, ReadOptions], Built]
 
 
+def without_mark(stream: BinaryIO) -> int:
+    """Skip a byte order mark at the start of a UTF-8 file; return where its content begins."""
+    stream.seek(0)
+    if stream.read(3) != b"\xef\xbb\xbf":
+        stream.seek(0)
+    return stream.tell()
+
+
 def read_whole(stream: BinaryIO) -> bytes:
     """Return all bytes of a file that has to be in memory; raises InvalidInput if too large."""
     data = stream.read(MAX_FILE_BYTES + 1)

@@ -12,6 +12,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ..geometry.arrays import Floats, Points3
 from ..geometry.rectilinear import valid_polygon
+from .crs import System
 
 Meaning = Literal["wall", "roof", "ground", "window", "door", "closure", "other"]
 
@@ -116,6 +117,26 @@ def bounds(surfaces: Iterable[Surface]) -> tuple[Floats, Floats]:
     """Return the lowest and the highest corner (3,) of surfaces."""
     points = np.concatenate([ring for surface in surfaces for ring in surface.rings])
     return points.min(axis=0), points.max(axis=0)
+
+
+Lists = Sequence[Sequence[Surface]]
+
+
+def localised(
+    lists: Sequence[Lists], system: System, base: Floats
+) -> tuple[list[tuple[tuple[Surface, ...], ...]], Floats, str]:
+    """Return surfaces in metres near zero, their origin (3,), and the name of their system.
+
+    The points of `lists` + base are coordinates of the source.
+    """
+    every = [surface for rows in lists for row in rows for surface in row]
+    rings = [ring for surface in every for ring in surface.rings]
+    points, origin, crs = system.local(np.concatenate([np.empty((0, 3)), *rings]), base)
+    ends = np.cumsum([len(ring) for ring in rings], dtype=np.int64)
+    placed = iter(np.split(points, ends[:-1]))
+    moved = iter([replace(s, rings=tuple(next(placed) for _ in s.rings)) for s in every])
+    found = [tuple(tuple(next(moved) for _ in row) for row in rows) for rows in lists]
+    return found, origin, crs
 
 
 def ring(points: Any) -> Points3 | None:

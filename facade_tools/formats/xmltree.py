@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import BinaryIO
 from xml.etree.ElementTree import Element, ParseError
 
@@ -28,18 +28,18 @@ def parse(data: bytes) -> Element:
     return root
 
 
-def iterate(stream: BinaryIO, name: str) -> Iterator[Element]:
-    """Yield every outermost element called `name`, with its whole content, one in memory."""
+def iterate(stream: BinaryIO, names: Collection[str]) -> Iterator[Element]:
+    """Yield every outermost element of these names, with its whole content, one in memory."""
     depth = 0
     stack: list[Element] = []
     try:
         for event, element in iterparse(stream, events=("start", "end"), forbid_dtd=True):
             if event == "start":
                 stack.append(element)
-                depth += local(element.tag) == name
+                depth += local(element.tag) in names
                 continue
             stack.pop()
-            if local(element.tag) == name:
+            if local(element.tag) in names:
                 depth -= 1
                 if depth == 0:
                     yield element

@@ -44,15 +44,19 @@ class ParseOptions:
     labels: str | None
     raw_labels: str | None
     overlay: str | None
+    height: float | None = None
+    storey_height: float | None = None
 
     @property
-    def recorded(self) -> dict[str, str | None]:
+    def recorded(self) -> dict[str, str | float | None]:
         """Options that can change the content."""
+        metres = {"height": self.height, "storey_height": self.storey_height}
         return {
             "method": self.method, "solver": self.solver,
             "mask": self.mask and Path(self.mask).name,
             "grammar": self.grammar and Path(self.grammar).name,
             "classifier": self.classifier and Path(self.classifier).name,
+            **{name: value for name, value in metres.items() if value is not None},
         }  # fmt: skip
 
 
@@ -102,7 +106,9 @@ class Read:
 
 
 def _read_options(options: ParseOptions) -> ReadOptions:
-    return ReadOptions(options.classifier, options.grammar, options.solver)
+    return ReadOptions(
+        options.classifier, options.grammar, options.solver, options.height, options.storey_height
+    )
 
 
 @lru_cache(maxsize=1)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import click
 
 from ._options import StreamOptions, stream_options
@@ -10,6 +12,7 @@ from ._options import StreamOptions, stream_options
 # when it is called for.
 METHODS = {
     "forest": "facade_tools.segmentation.parsing:forest_method",
+    "mrf": "facade_tools.reconstruction.mrf:mrf_method",
 }
 
 
@@ -23,17 +26,26 @@ METHODS = {
 )  # fmt: skip
 @click.option(
     "--method", type=click.Choice(list(METHODS)), default="forest", show_default=True,
-    help="forest: trees over pixels and a split grammar (TSKP10).",
+    help="forest: trees over pixels and a split grammar (TSKP10); mrf: chains of floors and of "
+    "window stripes, nothing learned (KSTTP09).",
 )  # fmt: skip
 @click.option(
     "--solver", type=click.Choice(["dp", "walk"]), default="dp", show_default=True,
     help="dp: exact in turn over rows and columns; walk: the paper's random walk.",
 )  # fmt: skip
+@click.option(
+    "--height", type=click.FloatRange(1, 1000), metavar="M",
+    help="mrf: height of the building to the top of its roof, metres.  [default: unknown]",
+)  # fmt: skip
+@click.option(
+    "--storey-height", type=click.FloatRange(1, 20), metavar="M",
+    help="mrf: height of a storey, metres.  [default: unknown; taken to be 3]",
+)  # fmt: skip
 @click.option("--mask", metavar="PNG", help="Not 0 where something hides the facade.")
 @click.option("--labels", metavar="PNG", help="Label map of the regions; a folder for many.")
 @click.option("--raw-labels", metavar="PNG", help="Label map of the classifier alone.")
 @click.option("--overlay", metavar="PNG", help="The photograph with the regions over it.")
-def command(stream: StreamOptions, **values: str | None) -> None:
+def command(stream: StreamOptions, **values: Any) -> None:
     """Read rectified photographs of facades: floors, columns, windows, balconies, doors, roofs.
 
     IMAGE is a picture (JPEG, PNG, TIFF, BMP, WebP) or a folder of them. Use `facade rectify`
@@ -44,4 +56,4 @@ def command(stream: StreamOptions, **values: str | None) -> None:
     """
     from ._parsing import ParseOptions, run_parse
 
-    run_parse(stream, ParseOptions(**values))  # type: ignore[arg-type]
+    run_parse(stream, ParseOptions(**values))

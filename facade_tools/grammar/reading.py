@@ -14,11 +14,16 @@ from ..imaging.image_io import Photo
 
 @dataclass(frozen=True, slots=True)
 class ReadOptions:
-    """What a method is built from: a classifier's file, a grammar's name or file, the solver."""
+    """What a method is built from: a classifier's file, a grammar's name or file, the solver.
+
+    height, storey_height: metres, of the building to the top of its roof and of a storey.
+    """
 
     classifier: str | None = None
     grammar: str | None = None
     solver: str = "dp"
+    height: float | None = None
+    storey_height: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,64 @@
+"""The stripes of windows of a facade: the chain of its columns (KSTTP09 3.3)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import Infeasible
+from ..geometry.arrays import Floats
+from .chains import Chain, ChainProblem, solve
+from .evidence import profiles
+from .potentials import (
+    Weights,
+    boundary_costs,
+    boundary_strength,
+    diagonal_sums,
+    gap_costs,
+    labels,
+    line_differences,
+    run_contents,
+)
+from .storeys import Facade
+
+STRIPE = (5, 30)  # cells: widths of a stripe, 0.5 to 3 m
+GAP = 60  # cells: the widest wall between two stripes
+WEIGHTS = Weights(alpha=3.0, beta=0.4, boundary=0.05, gap=0.03, content=0.2)
+COST = 0.25  # of a stripe
+
+
+def stripes(facade: Facade, *, gaps: bool = True) -> Chain:
+    """Return the stripes of windows from the left: the exact minimum of eq. 3 with eq. 8.
+
+    gaps: with the term of walls between windows (homogeneous and symmetric); it can be switched
+    off. A facade without any has an empty chain.
+    """
+    side = np.ascontiguousarray(facade.picture[facade.sky :].transpose(1, 0, 2))
+    across = profiles(facade.plane[facade.sky :])[1]
+    evidence = across / (np.percentile(across, 95) + 1e-9)
+    n = len(side)
+    widest = STRIPE[1]
+    unary = (
+        labels(n, STRIPE, STRIPE)
+        + WEIGHTS.boundary * boundary_costs(boundary_strength(side), widest)
+        - WEIGHTS.content * run_contents(evidence, widest)
+        + COST
+    )
+    table = gap_costs(side, GAP) if gaps else np.zeros((n + 1, GAP + 1))
+    ends = np.zeros(n + 1)
+    sums = diagonal_sums(line_differences(side))
+    try:
+        return solve(ChainProblem(sums, unary, table, WEIGHTS, ends, grounded=False))
+    except Infeasible:
+        return Chain((), (), 0.0)
+
+
+def spans(chain: Chain) -> list[tuple[int, int]]:
+    """Return the stripes as (x0, x1) in cells."""
+    return [(start, start + size) for start, size in zip(chain.starts, chain.sizes, strict=True)]
+
+
+def evidence_of(facade: Facade) -> Floats:
+    """Return the columns' profile below the sky, (m,), 1 where windows are usual."""
+    across = profiles(facade.plane[facade.sky :])[1]
+    out: Floats = across / (np.percentile(across, 95) + 1e-9)
+    return out

@@ -76,6 +76,13 @@ def test_the_projection_comes_back(lon: float, lat: float, east: float, north: f
         ("7,5 m", 7.5),
         ("24 ft", 7.3152),
         ("24'6\"", 7.4676),
+        ("30 ft", 9.144),
+        ("12 ft 6 in", 3.81),
+        ("12′6″", 3.81),
+        ("~ 9 m", 9.0),
+        ("350 cm", 3.5),
+        ("2;3", 2.0),
+        ("-1", None),
         ("high", None),
         ("", None),
     ],
@@ -93,6 +100,13 @@ def test_levels_give_the_eaves_and_height_gives_the_top() -> None:
     assert by_height.height == pytest.approx(6.0)
     assert by_height.roof.pitch == pytest.approx(45.0)
     assert by_height.roof.direction == "x"
+
+
+def test_tags_under_the_names_of_others_count_too() -> None:
+    ring = feature()
+    ring["properties"] = {"HEIGHT": 9.5, "roof_shape": "gabled", "roof_height": 3.5}
+    (house,), _ = read(ring, metres=True)
+    assert (house.height, house.roof.style) == (pytest.approx(6.0), "gable")
 
 
 def test_a_roof_that_leaves_too_little_wall_is_flattened_and_counted() -> None:
@@ -128,12 +142,105 @@ def test_a_turned_house_lies_along_its_axes_and_its_frame_leads_back() -> None:
     assert shapely.Polygon(back).symmetric_difference(given_ring).area < 0.01
 
 
-def test_degrees_are_projected_around_each_footprint() -> None:
+def test_degrees_are_projected_and_the_frame_leads_back_to_them() -> None:
     origin = (11.43, 48.76)
-    ring = to_degrees(np.array(RECTANGLE, dtype=float), origin).tolist()
-    (house,), _ = read(feature(ring))
-    assert shapely.Polygon(house.polygon[0]).area == pytest.approx(96.0, abs=0.05)
-    assert house.frame.crs.startswith("+proj=tmerc +lat_0=48.76")
+    ring = to_degrees(np.array(RECTANGLE, dtype=float), origin)
+    (house,), _ = read(feature(ring.tolist()))
+    assert shapely.Polygon(house.polygon[0]).area == pytest.approx(96.0, abs=2e-3)
+    assert house.frame.crs.startswith("+proj=tmerc +lat_0=48.7500000 +lon_0=11.5000000 ")
+    turn = math.radians(house.frame.rotation)
+    c, s = math.cos(turn), math.sin(turn)
+    back = np.array(house.polygon[0]) @ np.array([[c, s], [-s, c]]) + house.frame.shift[:2]
+    degrees = to_degrees(back, (11.5, 48.75))
+    apart = to_metres(degrees, origin)[:, None] - np.array(RECTANGLE[:4], dtype=float)
+    assert np.hypot(*apart.T).min(axis=0).max() < 1e-3
+
+
+def test_a_house_across_the_180th_meridian_is_whole() -> None:
+    ring = to_degrees(np.array(RECTANGLE, dtype=float), (179.99995, -16.0))
+    (house,), _ = read(feature(np.where(ring > 180, ring - 360, ring).tolist()))
+    assert shapely.Polygon(house.polygon[0]).area == pytest.approx(96.0, abs=2e-3)
+
+
+def named(name: str, factor: float = 1.0) -> bytes:
+    ring = [[(x + 678000) * factor, (y + 5403000) * factor, 400.0] for x, y in RECTANGLE]
+    crs = {"type": "name", "properties": {"name": f"urn:ogc:def:crs:EPSG::{name}"}}
+    collection = {"type": "FeatureCollection", "features": [feature(ring)], "crs": crs}
+    return json.dumps(collection).encode()
+
+
+@pytest.mark.parametrize(
+    ("data", "crs"),
+    [
+        (named("25832"), "EPSG:25832"),
+        (named("2263", 3937 / 1200), "EPSG:2263 in metres"),
+        (b"\xef\xbb\xbf" + named("25832"), "EPSG:25832"),
+    ],
+)
+def test_named_systems_are_read_in_their_unit(data: bytes, crs: str) -> None:
+    (record,) = geojson.records(io.BytesIO(data), ReadOptions())
+    (house,) = geojson.build(record, ReadOptions()).artifacts
+    assert house.frame.crs == crs
+    assert house.frame.shift[:2] == pytest.approx((678006.0, 5403004.0), abs=1e-3)
+    assert shapely.Polygon(house.polygon[0]).area == pytest.approx(96.0)
+
+
+@pytest.mark.parametrize("indent", [None, 1])
+@pytest.mark.parametrize("bare", [False, True])
+def test_a_single_feature_or_geometry_is_read(indent: int | None, bare: bool) -> None:
+    collection = {"type": "GeometryCollection", "geometries": [feature()["geometry"]]}
+    document = collection if bare else feature()
+    data = json.dumps(document, indent=indent).encode()
+    assert geojson.detect(data)
+    options = ReadOptions(metres=True)
+    (record,) = geojson.records(io.BytesIO(data), options)
+    assert len(geojson.build(record, options).artifacts) == 1
+
+
+def box(x0: float, y0: float, x1: float, y1: float, name: str, **tags: Any) -> dict[str, Any]:
+    ring = [[x0, y0], [x1, y0], [x1, y1], [x0, y1], [x0, y0]]
+    return {**feature(ring), "id": name, "properties": tags}
+
+
+PARTED = (
+    box(15, 3, 19, 7, "cap", **{"building:part": "yes", "height": "18", "min_height": "15"}),
+    box(0, 0, 20, 10, "house", building="yes", height="15"),
+    box(0, 0, 14, 10, "low", **{"building:part": "yes", "height": "20 ft"}),
+    box(14, 0, 20, 10, "tower", **{"building:part": "tower", "height": "15"}),
+    box(80, 0, 90, 10, "lone", **{"building:part": "yes", "height": "7"}),
+)
+
+
+@pytest.mark.parametrize("lines", [False, True])
+def test_a_building_in_parts_is_its_parts(lines: bool) -> None:
+    found, notes = read(*PARTED, lines=lines, metres=True)
+    assert {house.id: house.height for house in found} == pytest.approx(
+        {"cap": 18.0, "low": 6.096, "tower": 15.0, "lone": 7.0}
+    )
+    assert {house.tags.get("part_of") for house in found} == {"house", None}
+    assert notes["building part that begins above the ground: carried down to it"] == 1
+
+
+def test_a_building_in_parts_becomes_boxes_of_their_heights() -> None:
+    (house, lone), _ = read(*PARTED, metres=True, kind="buildings")
+    assert (house.id, lone.id) == ("house", "lone")
+    assert not list(building_problems(house))
+    heights = {round(b.height, 3) for b in house.boxes}
+    assert heights == {18.0, 15.0, 6.096}
+    union = shapely.union_all(
+        [
+            shapely.box(b.x - b.width / 2, b.y - b.depth / 2, b.x + b.width / 2, b.y + b.depth / 2)
+            for b in house.boxes
+        ]
+    )
+    assert union.area == pytest.approx(200.0)
+
+
+def test_what_no_part_covers_stays() -> None:
+    parts = (PARTED[1], PARTED[3])
+    found, _ = read(*parts, metres=True)
+    areas = {h.id: shapely.Polygon(h.polygon[0]).area for h in found}
+    assert areas == pytest.approx({"tower": 60.0, "house": 140.0})
 
 
 def test_planar_coordinates_without_metres_are_refused_with_the_remedy() -> None:

@@ -5,11 +5,15 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
+import io
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, BinaryIO
+from itertools import islice
+from typing import Any, BinaryIO, cast
 
 from ..artifacts.attributes import (
     ROOF_BITS,
@@ -21,12 +25,14 @@ from ..artifacts.attributes import (
     Present,
 )
 from ..errors import InvalidInput
-from .reading import Built, ReadOptions, Record
+from .reading import HEAD_BYTES, Built, ReadOptions, Record
 from .xmltree import number
 
 UNITS = {"ft2": 0.3048**2, "m2": 1.0}
 LONGEST_LINE = 1 << 20
-LEAST_COLUMNS = 4
+LEAST_COLUMNS = 4  # of a table some of whose rows have another number of columns
+UTF16 = (b"\xff\xfe", b"\xfe\xff")
+THOUSANDS = re.compile(r"\d{1,3}(,\d{3})+(\.\d+)?")
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,20 +97,84 @@ AMES = Columns(
 
 
 def detect(head: bytes) -> bool:
-    """Tell a table by two lines of text with the same number of columns."""
-    lines = head.split(b"\n")[:3]
-    if len(lines) < 2 or b"\0" in head or head.lstrip()[:1] in (b"{", b"[", b"<"):
+    """Tell a table by rows of text with the same number of columns, as its first line has."""
+    if head.lstrip()[:1] in (b"{", b"[", b"<") or (b"\0" in head and head[:2] not in UTF16):
         return False
+    return _dialect(head) is not None
+
+
+@dataclass(frozen=True, slots=True)
+class Dialect:
+    """How a table is written: the encoding of its text, what stands between its columns."""
+
+    encoding: str
+    delimiter: str
+
+    def row(self, line: bytes) -> list[str]:
+        """Return the values of a line; raises InvalidInput where it is none."""
+        try:
+            text = line.decode(self.encoding).rstrip("\r\n")
+            rows = csv.reader(io.StringIO(text, newline=""), delimiter=self.delimiter, strict=True)
+            return [value.strip() for value in next(rows, [])]
+        except (UnicodeDecodeError, csv.Error) as error:
+            raise InvalidInput(f"is no row of the table: {error}") from None
+
+    def number(self, text: str) -> float | None:
+        """Return the number of a cell, also with thousands apart; beside `;` a comma is decimal."""
+        text = text.replace("\u00a0", "").replace("'", "").lstrip("$").strip()
+        if self.delimiter == ";" and "," in text:
+            return number(text.replace(".", "").replace(",", "."))
+        return number(text.replace(",", "") if THOUSANDS.fullmatch(text) else text)
+
+
+def _dialect(head: bytes) -> Dialect | None:
+    """Return how a table is written by its first lines; None where they are no table."""
+    for encoding in ("utf-8-sig", "cp1252"):
+        text = _text(head, encoding, cut=len(head) >= HEAD_BYTES)
+        if text is None:
+            continue
+        best = max((_columns_of(text, mark), mark) for mark in ",;\t|")
+        return Dialect(encoding, best[1]) if best[0] >= 2 else None
+    return None
+
+
+def _text(head: bytes, encoding: str, cut: bool) -> str | None:
+    if head[:2] in UTF16:
+        return head.decode("utf-16", "replace")
+    if cut:  # a character may be cut in two
+        head = head[: head.rfind(b"\n") + 1]
     try:
-        rows = [next(csv.reader([line.decode("utf-8-sig")])) for line in lines[:2]]
-    except (UnicodeDecodeError, csv.Error, StopIteration):
-        return False
-    return len(rows[0]) >= LEAST_COLUMNS and len(rows[0]) == len(rows[1])
+        return head.decode(encoding)
+    except UnicodeDecodeError:
+        return None
+
+
+def _columns_of(text: str, delimiter: str) -> int:
+    """Return how many columns the rows of a text have; 0 where most differ from the first."""
+    try:
+        rows = list(islice(csv.reader(io.StringIO(text, newline=""), delimiter=delimiter), 12))
+    except csv.Error:
+        return 0
+    names = [name.strip() for name in rows[0]] if rows else []
+    counts = [len(row) for row in rows[1:11] if row]
+    alike = sum(count == len(names) for count in counts)
+    if len(set(names)) < len(names) or not all(names) or 2 * alike < len(counts):
+        return 0
+    if len(names) >= LEAST_COLUMNS:
+        return len(names)
+    return len(names) if counts and alike == len(counts) else 0
 
 
 def records(stream: BinaryIO, options: ReadOptions) -> Iterator[Record]:
     """Yield a record a row."""
-    header = _row(stream.readline(LONGEST_LINE))
+    head = stream.read(HEAD_BYTES)
+    stream.seek(0)
+    if head[:2] in UTF16:
+        stream = cast(BinaryIO, codecs.EncodedFile(stream, "utf-8", "utf-16"))
+    elif b"\r" in head and b"\n" not in head:
+        raise InvalidInput("has no line feed at the end of its lines; expected one")
+    dialect = _dialect(head) or Dialect("utf-8-sig", ",")
+    header = dialect.row(stream.readline(LONGEST_LINE))
     columns = _columns(options.columns, header)
     number_ = 2
     while line := stream.readline(LONGEST_LINE):
@@ -112,15 +182,8 @@ def records(stream: BinaryIO, options: ReadOptions) -> Iterator[Record]:
         while line.count(b'"') % 2 and (more := stream.readline(LONGEST_LINE)):
             line, lines = line + more, lines + 1
         if line.strip():
-            yield Record((header, columns), line=number_, data=line)
+            yield Record((header, columns, dialect), line=number_, data=line)
         number_ += lines
-
-
-def _row(line: bytes) -> list[str]:
-    try:
-        return [value.strip() for value in next(csv.reader([line.decode("utf-8-sig")]), [])]
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise InvalidInput(f"is no row of a UTF-8 table: {error}") from None
 
 
 def _columns(mapping: Mapping[str, Any] | None, header: Sequence[str]) -> Columns:
@@ -173,8 +236,8 @@ def _named(columns: Columns) -> set[str]:
 
 def build(record: Record, options: ReadOptions) -> Built:
     """Return the attributes of one row."""
-    header, columns = record.payload
-    values = _row((record.data or b"").replace(b"\r\n", b"\n").rstrip(b"\n"))
+    header, columns, dialect = record.payload
+    values = dialect.row(record.data or b"")
     if len(values) != len(header):
         raise InvalidInput(f"has {len(values)} columns; expected {len(header)}")
     row = dict(zip(header, values, strict=True))
@@ -183,11 +246,12 @@ def build(record: Record, options: ReadOptions) -> Built:
         raise InvalidInput(f"has no id in column {columns.id!r}")
     notes: Counter[str] = Counter()
     garage = _meaning(row, columns.garage)
-    porch = _porch(row, columns)
+    numbers = {name: dialect.number(text) for name, text in row.items()}
+    porch = _porch(numbers, columns)
     none: tuple[Number, ...] = (0.0,) * 6
     unknown: tuple[Number, ...] = (None,) * 6
     mass = MassAttributes(
-        arf=_arf(row, columns, notes),
+        arf=_arf(numbers, columns, notes),
         garage=none if garage is False else unknown,
         porch=(none, none) if porch is False else (unknown, unknown),
     )
@@ -195,7 +259,9 @@ def build(record: Record, options: ReadOptions) -> Built:
     attributes = Attributes(
         id=identity,
         mass=mass,
-        element=ElementAttributes(roof=_roof(row, columns, notes), special=_special(row, columns)),
+        element=ElementAttributes(
+            roof=_roof(row, columns, notes), special=_special(numbers, columns)
+        ),
         present=None if present == Present() else present,
         tags={name: row[name] for name in columns.tags if row[name]},
     )
@@ -206,12 +272,12 @@ def _meaning(row: Mapping[str, str], choice: Choice | None) -> Any:
     return None if choice is None else choice.values.get(row[choice.column])
 
 
-def _area(row: Mapping[str, str], columns: Columns, name: str) -> float | None:
-    found = number(row[name])
+def _area(row: Mapping[str, Number], columns: Columns, name: str) -> float | None:
+    found = row[name]
     return None if found is None or found < 0.0 else found * UNITS[columns.area_unit]
 
 
-def _arf(row: Mapping[str, str], columns: Columns, notes: Counter[str]) -> tuple[Number, ...]:
+def _arf(row: Mapping[str, Number], columns: Columns, notes: Counter[str]) -> tuple[Number, ...]:
     """Return the floors' shares; an upper floor larger than the main one counts as large as it."""
     if columns.main_area is None or not columns.upper_areas:
         return (None,) * 3
@@ -227,7 +293,7 @@ def _arf(row: Mapping[str, str], columns: Columns, notes: Counter[str]) -> tuple
     return (1.0 / (1.0 + ratio), ratio / (1.0 + ratio), 0.0)
 
 
-def _porch(row: Mapping[str, str], columns: Columns) -> bool | None:
+def _porch(row: Mapping[str, Number], columns: Columns) -> bool | None:
     """Return False where no porch of any kind has an area; where one has, its side is unknown."""
     areas = [_area(row, columns, name) for name in columns.porches]
     return False if areas and all(area == 0.0 for area in areas) else None
@@ -240,6 +306,6 @@ def _roof(row: Mapping[str, str], columns: Columns, notes: Counter[str]) -> dict
     return {name: None if kind is None else int(name == kind) for name in ROOF_BITS}
 
 
-def _special(row: Mapping[str, str], columns: Columns) -> dict[str, Bit]:
-    count = None if columns.chimneys is None else number(row[columns.chimneys])
+def _special(row: Mapping[str, Number], columns: Columns) -> dict[str, Bit]:
+    count = None if columns.chimneys is None else row[columns.chimneys]
     return {"chimney": None if count is None else int(count > 0.0), "tower": None}

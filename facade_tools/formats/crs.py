@@ -92,6 +92,8 @@ class System:
         plan = points[:, 1::-1] if self.north_first else points[:, :2]
         if np.abs(plan[:, 1]).max(initial=0.0) > 90.0:  # the other order is meant
             plan = plan[:, ::-1]
+        if len(plan) and np.ptp(plan[:, 0]) > 180.0:  # across the 180th meridian
+            plan = np.column_stack([plan[:, 0] % 360.0, plan[:, 1]])
         check_degrees(plan)
         cell = cell_of(plan)
         metres = np.column_stack([to_metres(plan, cell), points[:, 2]])
@@ -102,8 +104,9 @@ class System:
 def check_degrees(plan: Points2) -> None:
     """Raise InvalidInput unless (n, 2) may be longitudes and latitudes."""
     largest = np.abs(plan).max(axis=0, initial=0.0)
-    if not (largest[0] <= 180.0 and largest[1] <= 90.0):
-        raise InvalidInput("coordinates are no degrees; expected longitude and latitude")
+    if not (largest[0] <= 360.0 and largest[1] <= 90.0):
+        text = "coordinates are no degrees; of GeoJSON, --metres says that they are planar"
+        raise InvalidInput(text)
 
 
 def cell_of(plan: Points2) -> tuple[float, float]:

@@ -53,9 +53,9 @@ def placed(parts: Sequence[Part], arrange: str, frames: Sequence[Frame | None] =
 
 
 def _is_map(frames: Sequence[Frame]) -> bool:
-    return len({frame.crs for frame in frames}) == 1 and len({f.shift for f in frames}) == len(
-        frames
-    )
+    """Tell places on one map from variants of one house, which all stand in one place."""
+    places = len({frame.shift for frame in frames})
+    return len({frame.crs for frame in frames}) == 1 and 2 * places > len(frames)
 
 
 def mapped(parts: Sequence[Part], frames: Sequence[Frame]) -> list[Part]:

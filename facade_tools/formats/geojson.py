@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, BinaryIO
 
 import ijson
@@ -12,96 +13,133 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ..artifacts.building import Box, Building, Frame
+from ..artifacts.building import Box, Building, Frame, Roof
 from ..artifacts.documents import parse_json
 from ..artifacts.footprint import Footprint
 from ..errors import InvalidInput
 from ..geometry.arrays import Points2
-from ..geometry.rectilinear import main_direction, partition, rotated, valid_polygon
-from .crs import in_degrees, named
-from .osm import is_building, shape_of
-from .projection import crs_name, to_metres
-from .reading import BY_NAME, HEAD_BYTES, Built, ReadOptions, Record
+from ..geometry.rectilinear import areas, main_direction, partition, rotated, valid_polygon
+from .crs import System
+from .geojson_parts import MARK, Feature, Part, polygons_of, tags_of, with_parts
+from .osm import Shape, is_building, length, shape_of
+from .reading import BY_NAME, HEAD_BYTES, Built, ReadOptions, Record, read_whole, without_mark
 
-TYPE = re.compile(rb'"type"\s*:\s*"(FeatureCollection|Feature)"')
+GEOMETRIES = "Polygon|MultiPolygon|GeometryCollection"
+TYPE = re.compile(rf'"type"\s*:\s*"(FeatureCollection|Feature|{GEOMETRIES})"'.encode())
 CRS = re.compile(rb'"crs"\s*:\s*\{.{0,200}?"name"\s*:\s*"([^"]{1,200})"', re.S)
 LEAST_AREA, LARGEST = 4.0, 2000.0  # m², metres
 LONGEST_LINE = 64 << 20
-MOST_CORNERS = 100_000
+LEFT_OVER = 0.1  # of an outline: what no part covers and is larger stays a footprint
 RECORD_MARK = b"\x1e"
+Row = tuple[str, BaseGeometry, Mapping[str, Any]]  # name, polygon and tags of what stands there
 
 
 def detect(head: bytes) -> bool:
-    """Tell a feature collection, or a feature a line, by the type."""
+    """Tell a feature collection, a feature a line, a feature or a geometry, by the type."""
     return head.lstrip(RECORD_MARK + b" \t\r\n")[:1] == b"{" and TYPE.search(head) is not None
 
 
 def records(stream: BinaryIO, options: ReadOptions) -> Iterator[Record]:
-    """Yield a record a feature."""
-    head = stream.read(HEAD_BYTES)
-    match = CRS.search(head)
-    crs = named(match[1].decode("utf-8", "replace")) if match else ""
-    stream.seek(0)
-    kind = TYPE.search(head)
-    if kind is not None and kind[1] == b"Feature" and b'"FeatureCollection"' not in head:
-        yield from _lines(stream, crs)
-        return
-    try:
-        for index, feature in enumerate(ijson.items(stream, "features.item", use_float=True)):
-            yield Record((feature, crs), pointer=f"/features/{index}")
-    except ijson.JSONError as error:
-        raise InvalidInput(f"not valid JSON: {str(error).splitlines()[0]}") from None
+    """Yield a record a feature; a building that is mapped in parts is one with them."""
+    source = _Source(stream, options)
+    yield from with_parts(source) if source.mentions(MARK) else source()
 
 
-def _lines(stream: BinaryIO, crs: str) -> Iterator[Record]:
-    number = 1
-    while line := stream.readline(LONGEST_LINE):
-        if line.strip(RECORD_MARK + b" \t\r\n"):
-            yield Record((None, crs), line=number, data=line)
-        number += 1
+class _Source:
+    """A file of features, which can be read again and again."""
+
+    def __init__(self, stream: BinaryIO, options: ReadOptions) -> None:
+        self.stream, self.start = stream, without_mark(stream)
+        head = stream.read(HEAD_BYTES)
+        size = stream.seek(0, 2)
+        stream.seek(max(size - HEAD_BYTES, self.start))
+        match = CRS.search(head) or CRS.search(stream.read())
+        named = match[1].decode("utf-8", "replace") if match else ""
+        system = System.of(named) if named else System("", degrees=True)
+        self.system = replace(system, degrees=False, metres=1.0) if options.metres else system
+        first = head.lstrip(RECORD_MARK + b" \t\r\n").split(b"\n")[0].rstrip()
+        self.collection = b'"FeatureCollection"' in head
+        self.lines = not self.collection and (first.endswith(b"}") or len(first) == len(head))
+
+    def mentions(self, word: bytes) -> bool:
+        """Tell whether a word stands in the file."""
+        self.stream.seek(self.start)
+        before = b""
+        while block := self.stream.read(1 << 20):
+            if word in before + block:
+                return True
+            before = block[-len(word) :]
+        return False
+
+    def __call__(self) -> Iterator[Record]:
+        """Yield a record a feature."""
+        self.stream.seek(self.start)
+        if self.collection:
+            yield from self._items()
+        elif self.lines:
+            yield from self._lines()
+        else:
+            value = parse_json(read_whole(self.stream))
+            if isinstance(value, dict) and value.get("type") != "Feature":
+                value = {"type": "Feature", "properties": None, "geometry": value}
+            yield Record(Feature(value, self.system), pointer="/0")
+
+    def _items(self) -> Iterator[Record]:
+        try:
+            items = ijson.items(self.stream, "features.item", use_float=True)
+            for index, value in enumerate(items):
+                yield Record(Feature(value, self.system), pointer=f"/features/{index}")
+        except ijson.JSONError as error:
+            raise InvalidInput(f"not valid JSON: {str(error).splitlines()[0]}") from None
+
+    def _lines(self) -> Iterator[Record]:
+        number = 1
+        while line := self.stream.readline(LONGEST_LINE):
+            if data := line.strip(RECORD_MARK + b" \t\r\n"):
+                yield Record(Feature(None, self.system), line=number, data=data)
+            number += 1
 
 
 def build(record: Record, options: ReadOptions) -> Built:
     """Return the footprints (or buildings) of one feature."""
-    feature, crs = record.payload
-    if record.data is not None:
-        feature = parse_json(record.data.lstrip(RECORD_MARK))
+    payload: Feature = record.payload
+    feature = payload.value if record.data is None else parse_json(record.data)
     notes: Counter[str] = Counter()
-    if not isinstance(feature, dict) or feature.get("type") != "Feature":
+    if not isinstance(feature, dict) or feature.get("type") not in ("Feature", *_GEOMETRIES):
         raise InvalidInput("is no Feature; expected a polygon with properties")
-    tags = feature.get("properties") or {}
-    polygons = list(_polygons(feature.get("geometry")))
-    if not isinstance(tags, dict) or not polygons or not is_building(tags):
+    if feature["type"] != "Feature":
+        feature = {"type": "Feature", "properties": None, "geometry": feature}
+    tags = tags_of(feature)
+    polygons = list(polygons_of(feature))
+    if not polygons or not is_building(tags):
         notes["feature that is no building polygon: left out"] += 1
         return Built((), notes)
     identity = _identity(feature, tags, record)
-    degrees = not options.metres and (not crs or in_degrees(crs))
-    found = []
+    boxes = options.kind in ("buildings", "attributes")
+    found: list[Footprint | Building] = []
     for index, rings in enumerate(polygons):
         name = identity if index == 0 else f"{identity}-{index + 1}"
-        found.append(_footprint(name, rings, tags, None if degrees else crs, notes))
-    if options.kind in ("buildings", "attributes"):
-        return Built(tuple(map(building_of, found)), notes)
+        parts = payload.parts if index == 0 else ()
+        shapes = [rings, *(part.rings for part in parts)]
+        (polygon, *others), origin, crs = _localised(shapes, payload.system, notes)
+        site = _Site.of(polygon, origin, crs)
+        rows: list[Row] = [(name, polygon, tags)]
+        if parts:
+            rows = _in_parts(name, polygon, list(zip(parts, others, strict=True)), tags, notes)
+        if boxes:
+            masses = [
+                (plan := site.plan(p), shape_of(t, plan, site.turn, notes)) for _, p, t in rows
+            ]
+            found.append(_boxed(name, masses, site.frame, tags))
+        else:
+            sites = [site if p is polygon else _Site.of(p, origin, crs) for _, p, _ in rows]
+            found += [
+                _footprint(n, at, p, t, notes) for at, (n, p, t) in zip(sites, rows, strict=True)
+            ]
     return Built(tuple(found), notes)
 
 
-def _polygons(geometry: Any) -> Iterator[list[Points2]]:
-    if not isinstance(geometry, dict):
-        return
-    kind, coordinates = geometry.get("type"), geometry.get("coordinates")
-    if kind not in ("Polygon", "MultiPolygon") or not isinstance(coordinates, list):
-        return
-    for rings in [coordinates] if kind == "Polygon" else coordinates:
-        try:
-            arrays = [np.array([p[:2] for p in ring], dtype=np.float64) for ring in rings]
-        except (TypeError, ValueError):
-            raise InvalidInput("a coordinate is no number", pointer="/geometry") from None
-        if any(array.ndim != 2 or array.shape[1] != 2 for array in arrays):
-            raise InvalidInput("a point has fewer than two numbers", pointer="/geometry")
-        if sum(map(len, arrays)) > MOST_CORNERS or not all(np.isfinite(a).all() for a in arrays):
-            raise InvalidInput("too many corners, or one at no finite place", pointer="/geometry")
-        if arrays:
-            yield arrays
+_GEOMETRIES = tuple(GEOMETRIES.split("|"))
 
 
 def _identity(feature: Mapping[str, Any], tags: Mapping[str, Any], record: Record) -> str:
@@ -112,54 +150,50 @@ def _identity(feature: Mapping[str, Any], tags: Mapping[str, Any], record: Recor
     return f"{BY_NAME}-{place}"
 
 
-def _footprint(
-    identity: str,
-    rings: list[Points2],
-    tags: Mapping[str, Any],
-    system: str | None,
-    notes: Counter[str],
-) -> Footprint:
-    local, origin, crs = _localised(rings, system)
-    polygon = _largest(valid_polygon(local), notes)
-    turn = main_direction(polygon)
-    turned = rotated(polygon, -turn)
-    x0, y0, x1, y1 = turned.bounds
-    if polygon.area < LEAST_AREA or max(x1 - x0, y1 - y0) > LARGEST:
-        size = f"{polygon.area:.2f} m², {max(x1 - x0, y1 - y0):.1f} m long"
-        raise InvalidInput(f"{size}; expected a building of 4 m² to 2 km (in metres?)")
-    middle = np.array([(x0 + x1) / 2.0, (y0 + y1) / 2.0])
-    plan = shapely.transform(turned, lambda points: np.round(points - middle, 4))
-    shape = shape_of(tags, plan, turn, notes)
-    c, s = np.cos(np.radians(turn)), np.sin(np.radians(turn))
-    x, y = np.array([[c, -s], [s, c]]) @ middle
-    shift = (round(origin[0] + float(x), 6), round(origin[1] + float(y), 6), 0.0)
-    outline = shapely.get_rings(shapely.orient_polygons(plan))
-    return Footprint(
-        identity,
-        tuple(tuple(map(tuple, shapely.get_coordinates(ring)[:-1].tolist())) for ring in outline),
-        shape.height,
-        shape.roof,
-        Frame(round(turn, 9), shift, crs),
-        {key: value for key, value in tags.items() if isinstance(value, str | int | float | bool)},
-    )
+# --- frames ---------------------------------------------------------------------------------------
+@dataclass(frozen=True)
+class _Site:
+    """The frame in which a footprint lies along the axes, its middle at the origin.
+
+    turn: degrees from there to the source; middle: of the turned polygon, metres.
+    """
+
+    turn: float
+    middle: Points2
+    frame: Frame
+
+    @classmethod
+    def of(cls, polygon: BaseGeometry, origin: Points2, crs: str) -> _Site:
+        """Return the frame of a polygon in metres around an origin; raises InvalidInput."""
+        if polygon.is_empty:
+            raise InvalidInput("an outline without area; expected at least three corners")
+        turn = main_direction(polygon)
+        x0, y0, x1, y1 = rotated(polygon, -turn).bounds
+        size = max(x1 - x0, y1 - y0)
+        if polygon.area < LEAST_AREA or size > LARGEST:
+            text = f"{polygon.area:.2f} m², {size:.1f} m long"
+            raise InvalidInput(f"{text}; expected a building of 4 m² to 2 km (in metres?)")
+        middle = np.array([(x0 + x1) / 2.0, (y0 + y1) / 2.0])
+        c, s = np.cos(np.radians(turn)), np.sin(np.radians(turn))
+        x, y = (origin[:2] + np.array([[c, -s], [s, c]]) @ middle).tolist()
+        return cls(turn, middle, Frame(round(turn, 9), (round(x, 6), round(y, 6), 0.0), crs))
+
+    def plan(self, polygon: BaseGeometry) -> BaseGeometry:
+        """Return a polygon in this frame, rounded to 0.1 mm."""
+        turned = rotated(polygon, -self.turn)
+        return shapely.transform(turned, lambda points: np.round(points - self.middle, 4))
 
 
 def _localised(
-    rings: list[Points2], system: str | None
-) -> tuple[list[Points2], tuple[float, float], str]:
-    """Return rings in metres around an origin, the origin in its system, and that system's name.
-
-    Degrees are projected around the middle of the polygon, which is the origin of a system of its
-    own; metres keep their system and only lose a whole number.
-    """
-    low, high = rings[0].min(axis=0), rings[0].max(axis=0)
-    if system is not None:
-        base = np.round((low + high) / 2.0)
-        return [ring - base for ring in rings], (float(base[0]), float(base[1])), system
-    if max(abs(low[0]), abs(high[0])) > 180.0 or max(abs(low[1]), abs(high[1])) > 90.0:
-        raise InvalidInput("coordinates are no degrees; --metres says that they are planar")
-    origin = round(float(low[0] + high[0]) / 2.0, 7), round(float(low[1] + high[1]) / 2.0, 7)
-    return [to_metres(ring, origin) for ring in rings], (0.0, 0.0), crs_name(origin)
+    polygons: Sequence[Sequence[Points2]], system: System, notes: Counter[str]
+) -> tuple[list[BaseGeometry], Points2, str]:
+    """Return polygons in metres, repaired, their common origin, and the name of its system."""
+    rings = [ring for rings in polygons for ring in rings]
+    flat = np.concatenate(rings)
+    points, origin, crs = system.local(np.column_stack([flat, np.zeros(len(flat))]), np.zeros(3))
+    local = iter(np.split(points[:, :2], np.cumsum([len(ring) for ring in rings])[:-1]))
+    found = [_largest(valid_polygon([next(local) for _ in rings]), notes) for rings in polygons]
+    return found, origin, crs
 
 
 def _largest(polygon: BaseGeometry, notes: Counter[str]) -> BaseGeometry:
@@ -169,29 +203,92 @@ def _largest(polygon: BaseGeometry, notes: Counter[str]) -> BaseGeometry:
     return max(parts, key=lambda part: part.area, default=shapely.Polygon())
 
 
+# --- artifacts ------------------------------------------------------------------------------------
+def _footprint(
+    identity: str, site: _Site, polygon: BaseGeometry, tags: Mapping[str, Any], notes: Counter[str]
+) -> Footprint:
+    plan = site.plan(polygon)
+    shape = shape_of(tags, plan, site.turn, notes)
+    outline = shapely.get_rings(shapely.orient_polygons(plan))
+    return Footprint(
+        identity,
+        tuple(tuple(map(tuple, shapely.get_coordinates(ring)[:-1].tolist())) for ring in outline),
+        shape.height,
+        shape.roof,
+        site.frame,
+        _kept(tags),
+    )
+
+
+def _kept(tags: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        key: value for key, value in tags.items() if isinstance(value, str | int | float | bool)
+    }
+
+
+def _in_parts(
+    identity: str,
+    polygon: BaseGeometry,
+    parts: Sequence[tuple[Part, BaseGeometry]],
+    tags: Mapping[str, Any],
+    notes: Counter[str],
+) -> list[Row]:
+    """Return name, polygon and tags of what a building consists of, highest first.
+
+    What no part covers is one more, with the tags of the whole, where it is worth a place.
+    """
+    rows: list[Row] = []
+    for part, shape in parts:
+        if shape.area < LEAST_AREA / 4.0:
+            notes["building part smaller than 1 m²: left out"] += 1
+            continue
+        if length(part.tags.get("min_height", part.tags.get("building:min_level", "0"))):
+            notes["building part that begins above the ground: carried down to it"] += 1
+        rows.append((part.identity, shape, {**part.tags, "part_of": identity}))
+    rest = areas(polygon.difference(shapely.union_all([shape for _, shape, _ in rows])))
+    large = [
+        p for p in shapely.get_parts(rest) if p.area > max(LEAST_AREA, LEFT_OVER * polygon.area)
+    ]
+    names = [identity, *(f"{identity}-{k}" for k in range(2, len(large) + 1))]
+    rows += [(name, piece, tags) for name, piece in zip(names, large, strict=False)]
+    return rows
+
+
 def building_of(footprint: Footprint) -> Building:
     """Return a footprint as boxes with its roof; its plan's residual stands in the tags."""
     polygon = valid_polygon([np.array(ring) for ring in footprint.polygon])
-    parts = partition([polygon])
-    boxes = tuple(
-        Box(
-            f"general-{index}",
-            "general",
-            round((x0 + x1) / 2.0, 6),
-            round((y0 + y1) / 2.0, 6),
-            round(x1 - x0, 6),
-            round(y1 - y0, 6),
-            footprint.height,
-            footprint.roof,
-        )
-        for index, (x0, y0, x1, y1) in enumerate(parts.rectangles[0].tolist(), start=1)
-    )
+    shape = Shape(footprint.height, footprint.roof or Roof("flat"))
+    return _boxed(footprint.id, [(polygon, shape)], footprint.frame, footprint.tags)
+
+
+def _boxed(
+    identity: str,
+    masses: Sequence[tuple[BaseGeometry, Shape]],
+    frame: Frame | None,
+    tags: Mapping[str, Any],
+) -> Building:
+    """Return the boxes of masses; where they overlap, the higher one stands."""
+    ordered = sorted(masses, key=lambda row: -row[1].height)
+    free: list[BaseGeometry] = []
+    for polygon, _ in ordered:
+        free.append(areas(polygon.difference(shapely.union_all(free))))
+    found = partition(free)
+    boxes: list[Box] = []
+    for (_, shape), rectangles in zip(ordered, found.rectangles, strict=True):
+        for x0, y0, x1, y1 in rectangles.tolist():
+            middle = round((x0 + x1) / 2.0, 6), round((y0 + y1) / 2.0, 6)
+            size = round(x1 - x0, 6), round(y1 - y0, 6)
+            name = f"general-{len(boxes) + 1}"
+            boxes.append(Box(name, "general", *middle, *size, shape.height, shape.roof))
+    if not boxes:
+        raise InvalidInput("no wall is long enough for a box; expected a building")
+    lowest = min(shape.height for _, shape in masses)
     return Building(
-        footprint.id,
-        boxes,
-        storey_height=min(3.0, round(1.99 * footprint.height, 4)),
+        identity,
+        tuple(boxes),
+        storey_height=min(3.0, round(1.99 * lowest, 4)),
         partial=True,
         complete=("mass", "roof"),
-        frame=footprint.frame,
-        tags={**footprint.tags, "plan_residual": round(parts.residual, 6)},
+        frame=frame,
+        tags={**_kept(tags), "plan_residual": round(found.residual, 6)},
     )

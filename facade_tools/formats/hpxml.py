@@ -6,6 +6,7 @@ Everything that the survey does not observe is null. `docs/hpxml.md` states ever
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -36,12 +37,14 @@ ROUNDEST, RAGGED = 0.98, 4.0  # of perimeter²/(16 area), which is 1 for a squar
 LARGEST_JETTY = 1.25
 GLASS_LIMIT = 0.8
 CEILINGS = (2.0, 4.5)  # metres: plausible mean heights of a storey
+ROOT = re.compile(rb"<([A-Za-z_][\w.-]*:)?HPXML[\s>/]")
+OUTSIDE = ("outside", "ambient")  # the second of HPXML 2
 WHOLE_WALL = 0.5  # share of the walls that must state a direction to be used by direction
 
 
 def detect(head: bytes) -> bool:
     """Tell HPXML by its root element."""
-    return b"<HPXML" in head
+    return ROOT.search(head) is not None
 
 
 def records(stream: BinaryIO, options: ReadOptions) -> Iterator[Record]:
@@ -114,7 +117,7 @@ def _ceiling(details: Element, said: str, notes: Counter[str]) -> float | None:
 
 
 def _ground_slabs(details: Element) -> list[Element]:
-    slabs = details.findall("Enclosure/Slabs/Slab")
+    slabs = details.findall("Enclosure//Slab")
     return [slab for slab in slabs if "garage" not in text(slab, "InteriorAdjacentTo")]
 
 
@@ -154,7 +157,7 @@ def _garage(details: Element) -> bool | None:
     """Tell an attached garage by its slab; None where only a placeholder or a wall speaks of it."""
     slabs = [
         slab
-        for slab in details.findall("Enclosure/Slabs/Slab")
+        for slab in details.findall("Enclosure//Slab")
         if "garage" in text(slab, "InteriorAdjacentTo")
     ]
     if any(_value(slab, "Area", SQUARE_FOOT) >= LEAST_GARAGE for slab in slabs):
@@ -211,7 +214,7 @@ def _wall_areas(details: Element, front: float) -> list[float]:
     outside = [
         wall
         for wall in details.findall("Enclosure/Walls/Wall")
-        if text(wall, "ExteriorAdjacentTo") == "outside"
+        if text(wall, "ExteriorAdjacentTo") in OUTSIDE
         and text(wall, "InteriorAdjacentTo") in ("living space", "conditioned space")
     ]
     sides = [0.0] * 4
@@ -234,7 +237,7 @@ def _share(glass: float, wall: float, notes: Counter[str]) -> Number:
 
 def _roof_bits(details: Element) -> dict[str, Bit]:
     """Return the flat bit by pitch; a slope does not tell gable from hip."""
-    pitches = [number(text(roof, "Pitch")) for roof in details.findall("Enclosure/Roofs/Roof")]
+    pitches = [number(text(roof, "Pitch")) for roof in details.findall("Enclosure//Roof")]
     known = [pitch for pitch in pitches if pitch is not None]
     flat = None if not known or len(known) < len(pitches) else int(any(p < 1.0 for p in known))
     only_flat = bool(known) and len(known) == len(pitches) and max(known) < 1.0

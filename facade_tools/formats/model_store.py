@@ -11,8 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from ..geometry.arrays import Floats, Points3
+from ..geometry.arrays import Floats, Integers, Points3
 from .surfaces import Model, Surface, bounds
+
+PlanBox = tuple[float, float, float, float]  # x0, y0, x1, y1
 
 
 class ModelStore:
@@ -100,37 +102,37 @@ class PlanBoxes:
     def __init__(self) -> None:
         """Start without boxes."""
         self._rows: dict[str, tuple[array[int], array[float]]] = {}
-        self._sorted: dict[str, tuple[Floats, Floats, float]] = {}
+        self._sorted: dict[str, tuple[Integers, Floats, float]] = {}
 
-    def add(self, number: int, model: Model) -> None:
-        """Note the box of a model under a number."""
-        numbers, rows = self._rows.setdefault(model.crs, (array("q"), array("d")))
+    def add(self, number: int, crs: str, box: PlanBox) -> None:
+        """Note a box under a number."""
+        numbers, rows = self._rows.setdefault(crs, (array("q"), array("d")))
         numbers.append(number)
-        rows.extend(plan_box(model))
+        rows.extend(box)
 
-    def near(self, model: Model, distance: float) -> list[int]:
-        """Return the numbers, ascending, of the boxes within a distance of a model's box."""
-        if model.crs not in self._rows:
+    def near(self, crs: str, box: PlanBox, distance: float) -> list[int]:
+        """Return the numbers, ascending, of the boxes within a distance of a box."""
+        if crs not in self._rows:
             return []
-        if model.crs not in self._sorted:
-            self._sorted[model.crs] = self._by_x(model.crs)
-        numbers, rows, widest = self._sorted[model.crs]
-        x0, y0, x1, y1 = plan_box(model)
+        if crs not in self._sorted:
+            self._sorted[crs] = self._by_x(crs)
+        numbers, rows, widest = self._sorted[crs]
+        x0, y0, x1, y1 = box
         first, last = np.searchsorted(rows[:, 0], [x0 - distance - widest, x1 + distance])
         some = rows[first : last + 1]
         close = (some[:, 2] >= x0 - distance) & (some[:, 0] <= x1 + distance)
         close &= (some[:, 3] >= y0 - distance) & (some[:, 1] <= y1 + distance)
-        return sorted(numbers[first : last + 1][close].astype(int).tolist())
+        return sorted(numbers[first : last + 1][close].tolist())
 
-    def _by_x(self, crs: str) -> tuple[Floats, Floats, float]:
-        numbers, rows = (np.array(values) for values in self._rows.pop(crs))
+    def _by_x(self, crs: str) -> tuple[Integers, Floats, float]:
+        numbers, flat = (np.array(values) for values in self._rows[crs])
         self._rows[crs] = (array("q"), array("d"))
-        rows = rows.reshape(-1, 4)
+        rows = flat.reshape(-1, 4)
         order = np.argsort(rows[:, 0], kind="stable")
         return numbers[order], rows[order], float(np.max(rows[:, 2] - rows[:, 0]))
 
 
-def plan_box(model: Model) -> tuple[float, float, float, float]:
+def plan_box(model: Model) -> PlanBox:
     """Return x0, y0, x1, y1 of a model in its source's coordinates, metres."""
     low, high = bounds(model.surfaces)
     x, y = model.origin[:2]

@@ -19,7 +19,7 @@ from ..geometry.boxes import box_rectangles
 from ..geometry.rectilinear import valid_polygon
 from .model_building import ADJOINS, Neighbour, building_of
 from .model_masses import footprint
-from .model_store import ModelStore, Numbers, PlanBoxes
+from .model_store import ModelStore, Numbers, PlanBoxes, plan_box
 from .outbuildings import Outbuildings, is_small, kind_of
 from .reading import Built, ReadOptions, Record
 from .surfaces import Model
@@ -97,9 +97,10 @@ def _outbuildings(models: Models) -> tuple[Outbuildings, Numbers]:
             small.add(model)
             places.append(number)
         else:
-            large.add(number, model)
+            large.add(number, model.crs, plan_box(model))
     for place, number in enumerate(places):
-        if large.near(model := small[place], ADJOINS):
+        model = small[place]
+        if large.near(model.crs, plan_box(model), ADJOINS):
             numbers.add(number)
             found.add(model, "garage", by_size=True)
     return found, numbers

@@ -23,9 +23,21 @@ USUAL = 30.0  # degrees, of every other style
 STEEPEST = 75.0
 LEVELS = 2  # of a building that states neither height nor levels
 SMALL = ("garage", "garages", "carport", "shed", "hut", "roof", "kiosk", "greenhouse")
+ALIASES = {
+    "num_floors": "building:levels",
+    "levels": "building:levels",
+    "measuredheight": "height",
+    "building_height": "height",
+    "building:height": "height",
+}
 OTHER_THINGS = ("highway", "waterway", "landuse", "natural", "leisure", "railway", "boundary")
-LENGTH = re.compile(r"^\s*([0-9]+(?:[.,][0-9]+)?)\s*(m|metres?|meters?|ft|feet|')?\s*$")
-FEET = re.compile(r"^\s*([0-9]+)\s*'\s*(?:([0-9]+)\s*\")?\s*$")
+NUMBER = r"([0-9]+(?:[.,][0-9]+)?)"
+LENGTH = re.compile(rf"[~≈]?\s*{NUMBER}\s*(m|metres?|meters?|mt|cm)?", re.I)
+FEET = re.compile(
+    rf"[~≈]?\s*{NUMBER}\s*(?:'|′|’|ft\.?|feet|foot)\s*(?:{NUMBER}\s*(?:\"|″|”|''|in\.?|inch|inches)?)?",
+    re.I,
+)
+FOOT = 0.3048  # metres
 COMPASS = ("N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE")
 COMPASS_SOUTH = ("S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW")
 
@@ -39,21 +51,46 @@ class Shape:
 
 
 def length(value: object) -> float | None:
-    """Return metres of a length as mappers write it (`7.5`, `7,5 m`, `24 ft`, `24'6"`), or None."""
-    text = str(value)
-    if match := FEET.match(text):
-        return 0.3048 * (float(match[1]) + float(match[2] or 0) / 12.0)
-    if match := LENGTH.match(text):
-        factor = 0.3048 if (match[2] or "").startswith(("f", "'")) else 1.0
-        return factor * float(match[1].replace(",", "."))
+    """Return metres of a length as mappers write it (`7.5`, `7,5 m`, `24 ft`, `24'6"`), or None.
+
+    Of several values (`2;3`) the first counts.
+    """
+    text = str(value).split(";")[0].strip()
+    if match := FEET.fullmatch(text):
+        return FOOT * (_decimal(match[1]) + _decimal(match[2] or "0") / 12.0)
+    if match := LENGTH.fullmatch(text):
+        return _decimal(match[1]) / (100.0 if (match[2] or "").lower() == "cm" else 1.0)
     return None
+
+
+def _decimal(text: str) -> float:
+    return float(text.replace(",", "."))
+
+
+def canonical(tags: Mapping[str, object]) -> dict[str, object]:
+    """Return tags under the names of OpenStreetMap, of those that others write otherwise.
+
+    Upper case, `roof_shape` for `roof:shape`, `num_floors` and `measuredHeight`.
+    """
+    found: dict[str, object] = {}
+    for key, value in tags.items():
+        name = key.lower()
+        name = ALIASES.get(name, re.sub(r"^(roof|building)_", r"\1:", name))
+        if key == name or name not in tags:
+            found[name] = value
+    return found
 
 
 def is_building(tags: Mapping[str, object]) -> bool:
     """Tell whether a polygon is a building: it says so, or it says nothing else."""
     if "building" in tags:
         return tags["building"] not in ("no", None)
-    return not any(key in tags for key in (*OTHER_THINGS, "building:part"))
+    return not is_part(tags) and not any(key in tags for key in OTHER_THINGS)
+
+
+def is_part(tags: Mapping[str, object]) -> bool:
+    """Tell whether a polygon is a part of a building."""
+    return tags.get("building:part") not in ("no", None, "")
 
 
 def shape_of(
@@ -65,6 +102,7 @@ def shape_of(
     clockwise to get there. The tag `height` is the roof's top: the roof is subtracted, and where
     less than 2.5 m of wall would be left, its pitch is lowered.
     """
+    tags = canonical(tags)
     style = _style(tags)
     direction = _direction(tags, plan, turn, style)
     span = _span(plan, style, direction)
@@ -90,10 +128,10 @@ def _style(tags: Mapping[str, object]) -> RoofStyle:
 
 def _heights(tags: Mapping[str, object], notes: Counter[str]) -> tuple[float | None, float | None]:
     """Return the height of the roof's top, or that of the eaves, whichever is stated."""
-    total = length(tags.get("height", tags.get("building:height", "")))
+    total = length(tags.get("height", ""))
     if total:
         return total, None
-    levels = length(tags.get("building:levels", tags.get("levels", "")))
+    levels = length(tags.get("building:levels", ""))
     if levels:
         return None, LEVEL_HEIGHT * levels
     notes["neither height nor levels: 6 m assumed, 3 m of a garage or shed"] += 1

@@ -12,7 +12,7 @@ from shapely.geometry.base import BaseGeometry
 
 from .model_building import ADJOINS, Neighbour
 from .model_masses import footprint
-from .model_store import ModelStore, Numbers, PlanBoxes
+from .model_store import ModelStore, Numbers, PlanBoxes, plan_box
 from .surfaces import Model, bounds
 
 # Ends of function codes: of the German cadastre (AdV), and words of other sources.
@@ -59,7 +59,7 @@ class Outbuildings:
         """
         if by_size:
             self._by_size.add(len(self._waiting))
-        self._boxes.add(len(self._waiting), model)
+        self._boxes.add(len(self._waiting), model.crs, plan_box(model))
         self._waiting.add(model)
         self._kinds.append(sys.intern(kind))
         self._taken.append(0)
@@ -68,7 +68,9 @@ class Outbuildings:
         """Return the outbuildings that adjoin a house; each goes to the first that asks."""
         if not house.surfaces:
             return ()
-        near = [k for k in self._boxes.near(house, ADJOINS) if not self._taken[k]]
+        near = [
+            k for k in self._boxes.near(house.crs, plan_box(house), ADJOINS) if not self._taken[k]
+        ]
         found = []
         plan = placed_plan(house) if near else None
         for number in near:

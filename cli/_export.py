@@ -28,6 +28,7 @@ SCENES = {
     "footprint": "facade_tools.geometry.details:footprint_scene",
     "parse": "facade_tools.grammar.relief:parse_scene",
     "layout": "facade_tools.layering.scene:layout_scene",
+    "derivation": "facade_tools.reconstruction.records:derivation_scene",
 }
 # Kind of artifact -> function that makes a CityModel of it.
 CITY = {

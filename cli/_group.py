@@ -31,6 +31,7 @@ STAGES: dict[str, Stage] = {
     "attributes": Stage("attributes", SUPPORT, "Compute the 49 attributes of buildings."),
     "train-parser": Stage("train_parser", SUPPORT, "Train the pixel classifier of parse-image."),
     "sample-grammar": Stage("sample_grammar", SUPPORT, "Draw random facades of a split grammar."),
+    "derive": Stage("derive", SUPPORT, "Turn footprints into buildings by a shape grammar."),
     "rectify": Stage("rectify", SUPPORT, "Turn a photograph of a facade straight."),
     "evaluate": Stage("evaluate", SUPPORT, "Negative log density of buildings under a model."),
     "import": Stage("import_", SUPPORT, "Read buildings from public formats."),

@@ -19,6 +19,7 @@ DRAWINGS = {
     "blocks": "facade_tools.stylization.drawing:blocks_scene",
     "stylesheet": "facade_tools.stylization.drawing:sheet_picture",
     "parse": "facade_tools.imaging.label_views:parse_view",
+    "derivation": "facade_tools.reconstruction.records:derivation_scene",
 }
 
 MOST_PIXELS = 16_000_000

@@ -18,6 +18,7 @@ KINDS: dict[str, str] = {
     "attributes": "attributes:Attributes",
     "blocks": "blocks:Blocks",
     "building": "building:Building",
+    "derivation": "derivation:Derivation",
     "design": "design:Design",
     "footprint": "footprint:Footprint",
     "grammar": "grammar:Grammar",
@@ -25,6 +26,7 @@ KINDS: dict[str, str] = {
     "library": "library:Library",
     "model": "model:Model",
     "parse": "parse:Parse",
+    "shape-grammar": "shape_grammar:ShapeGrammar",
     "stylesheet": "stylesheet:StyleSheet",
 }
 

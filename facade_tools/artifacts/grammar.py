@@ -58,11 +58,23 @@ class Grammar:
 
 
 @dataclass(frozen=True, slots=True)
+class Geometry:
+    """Planar faces in space: points (m, z up), and per face its outer ring, then holes.
+
+    Rings are indices of points; the outer one runs counter-clockwise seen from outside.
+    """
+
+    points: tuple[tuple[float, ...], ...] = field(metadata={"keep": True})
+    faces: tuple[tuple[tuple[int, ...], ...], ...] = field(metadata={"keep": True})
+
+
+@dataclass(frozen=True, slots=True)
 class Node:
     """A shape of a derivation: symbol, scope, and the shapes that its rule made of it.
 
     scope: least corner, then greatest corner, in 2 or 3 coordinates; pixels (y down) in a parse,
-    metres elsewhere. split: axis of the rule; None at a leaf. label: class of a leaf.
+    metres elsewhere. split: axis of the rule, or its operator; None at a leaf. label: class of a
+    leaf. rule: number of the rule that was applied, of a 3D grammar. geometry: of a leaf in space.
     """
 
     symbol: str = field(metadata={"keep": True})
@@ -70,3 +82,5 @@ class Node:
     split: str | None = None
     label: str | None = None
     children: tuple[Node, ...] = ()
+    rule: int | None = None
+    geometry: Geometry | None = None

@@ -18,11 +18,16 @@ def door_parts(element: Element) -> Parts:
     """Return the boxes of a door by material (trim, door, glass, metal, stone)."""
     u0, v0 = element.u, element.v
     u1, v1 = u0 + element.width, v0 + element.height
-    glazed = any(word in element.style for word in GLAZED)
-    parts = _glazed(u0, v0, u1, v1) if glazed else _panelled(u0, v0, u1, v1)
+    parts = door_leaf(element.style, u0, v0, u1, v1)
     parts["trim"] = [*casing(u0, v0, u1, v1, floor=True), *parts.get("trim", [])]
     parts["stone"] = [(u0 - 0.1, v0, 0.0, u1 + 0.1, v0 + 0.03, 0.16)]
     return parts
+
+
+def door_leaf(style: str, u0: float, v0: float, u1: float, v1: float) -> Parts:
+    """Return the leaf alone (door, glass, metal, trim), as it stands in an opening."""
+    glazed = any(word in style for word in GLAZED)
+    return _glazed(u0, v0, u1, v1) if glazed else _panelled(u0, v0, u1, v1)
 
 
 def _glazed(u0: float, v0: float, u1: float, v1: float) -> Parts:

@@ -56,6 +56,12 @@ def _sill(u0: float, v0: float, u1: float) -> list[Box6]:
 Built = tuple[list[Box6], list[Box6]]
 
 
+def glazing(style: str, u0: float, v0: float, u1: float, v1: float) -> Parts:
+    """Return the sashes and panes alone (trim, glass), as they stand in an opening."""
+    frames, panes = _STYLES.get(style, _fixed)(u0, v0, u1, v1)
+    return {"trim": frames, "glass": panes}
+
+
 def sash_leaf(
     u0: float, v0: float, u1: float, v1: float, *, depth: float, grid: tuple[int, int]
 ) -> Built:

@@ -1,0 +1,46 @@
+"""Where in a hand-written file a JSON pointer leads to."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..errors import InvalidInput, Place
+
+
+def line_of(data: bytes, pointer: str) -> int | None:
+    """Return the line (from 1) of the value at a JSON pointer in YAML or JSON text.
+
+    A pointer that leads nowhere gives the line of the last value on its way; text that cannot be
+    read gives None.
+    """
+    import yaml
+
+    try:
+        node: Any = yaml.compose(data, Loader=yaml.SafeLoader)
+    except (yaml.YAMLError, ValueError, RecursionError):
+        return None
+    if node is None:
+        return None
+    for part in pointer.strip("/").split("/") if pointer.strip("/") else []:
+        child = _child(node, part.replace("~1", "/").replace("~0", "~"))
+        if child is None:
+            break
+        node = child
+    return int(node.start_mark.line) + 1
+
+
+def _child(node: Any, part: str) -> Any:
+    import yaml
+
+    if isinstance(node, yaml.MappingNode):
+        return next((value for key, value in node.value if str(key.value) == part), None)
+    if isinstance(node, yaml.SequenceNode) and part.isdigit() and int(part) < len(node.value):
+        return node.value[int(part)]
+    return None
+
+
+def located(error: InvalidInput, data: bytes, source: str) -> InvalidInput:
+    """Return the error with the file and, told by its pointer, the line."""
+    place = error.place
+    line = line_of(data, place.pointer) if place.line is None and place.pointer else place.line
+    return InvalidInput(error.message, Place(place.source or source, line, place.pointer))

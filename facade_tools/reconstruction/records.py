@@ -1,0 +1,67 @@
+"""A derivation as an artifact, and such an artifact as a scene."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..artifacts.derivation import Derivation
+from ..artifacts.grammar import Geometry, Node
+from ..artifacts.shape_grammar import ShapeGrammar
+from ..geometry.mesh import Material, Mesh, Scene
+from ..geometry.solids import Label, Solid, triangulated
+from .drawing import color_of, mass_of
+from .engine import Derived
+from .skins import Skins
+
+PLACES = 9  # decimals of metres
+
+
+def derivation_of(derived: Derived, grammar: ShapeGrammar, identity: str) -> Derivation:
+    """Return the artifact of a derivation. Raises InvalidInput where it has no volume."""
+    solid = mass_of(derived)
+    mass = Geometry(tuple(map(tuple, np.round(solid.vertices, PLACES).tolist())), solid.faces)
+    terminals = dict(grammar.terminals)
+    return Derivation(
+        identity, grammar.id, _rounded(derived.root), mass, terminals, derived.parameters
+    )
+
+
+def _rounded(node: Node) -> Node:
+    """Return a tree whose numbers have no digits of rounding errors."""
+    geometry = node.geometry
+    if geometry is not None:
+        points = np.round(np.array(geometry.points), PLACES) + 0.0
+        geometry = Geometry(tuple(map(tuple, points.tolist())), geometry.faces)
+    scope = tuple(round(value, PLACES) + 0.0 for value in node.scope)
+    children = tuple(map(_rounded, node.children))
+    return Node(node.symbol, scope, node.split, node.label, children, node.rule, geometry)
+
+
+def derivation_scene(derivation: Derivation) -> Scene:
+    """Return the scene of a derivation's artifact: the mass, and the leaves' faces around it."""
+    mass = derivation.mass
+    labels = tuple(Label("wall") for _ in mass.faces)
+    points, faces, _ = triangulated(Solid(np.array(mass.points, float), mass.faces, labels))
+    skins = Skins()
+    count: Counter[str] = Counter()
+    for leaf in _leaves(derivation.root):
+        count[leaf.symbol] += 1
+        assert leaf.geometry is not None
+        own = np.array(leaf.geometry.points, float).reshape(-1, 3)
+        for face in leaf.geometry.faces:
+            skins.add(f"{leaf.symbol}-{count[leaf.symbol]}", leaf.symbol, own, face)
+    materials = {
+        name: Material(name, color_of(look)) for name, look in derivation.terminals.items()
+    }
+    meshes = (Mesh("mass", points, faces, "mass"), *skins.meshes())
+    return Scene(derivation.id, meshes, {"mass": Material("mass", "#cfc6b2"), **materials})
+
+
+def _leaves(node: Node) -> Iterator[Node]:
+    if node.geometry is not None:
+        yield node
+    for child in node.children:
+        yield from _leaves(child)

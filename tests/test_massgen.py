@@ -21,7 +21,7 @@ from facade_tools.exteriors.attributes import (
 from facade_tools.exteriors.mass_candidates import mass_distance
 from facade_tools.exteriors.mass_energy import layout_energy, mass_energy, target_of
 from facade_tools.exteriors.mass_layout import new_layout, new_work
-from facade_tools.exteriors.mass_roofs import roof_height
+from facade_tools.exteriors.mass_roofs import roof_height, under_tower
 from facade_tools.exteriors.massgen import generate_mass
 from facade_tools.geometry.boxes import box_rectangles, shared_outline
 from facade_tools.geometry.floors import floor_rectangles
@@ -244,6 +244,27 @@ def test_tower_has_a_cone_on_the_highest_small_box():
         assert max(tower.width, tower.depth) <= 4.6
         assert tower.height == max(b.height for b in building.boxes)
         assert building.energy.mass < 1e-4
+
+
+def test_eaves_of_the_house_stay_under_the_tower():
+    boxes = (
+        Box("main", "general", 5, 4, 10, 8, 6.0),
+        Box("wing", "general", 12, 4, 4, 6, 5.7),
+        Box("tower", "general", 1, 1, 3, 3, 6.0),
+    )
+    heights = {b.id: b.height for b in under_tower(boxes, (), 3.0)}
+    assert heights == {"main": 5.3, "wing": 5.3, "tower": 6.0}
+    heights = {b.id: b.height for b in under_tower(boxes, ("main",), 3.0)}
+    assert heights == {"main": 6.0, "wing": 5.3, "tower": 6.0}
+
+
+def test_two_roof_styles_get_two_boxes_or_are_reported():
+    for name in PLANS:
+        (building,) = made(targets(name, roof={"flat": 1}))
+        general = [b.roof.style for b in building.boxes if b.kind == "general"]
+        reported = building.energy.residuals.get("roof", 0)
+        assert len({"gable", "flat"} & set(general)) + reported == 2
+        assert len(general) > 1 or reported == 1
 
 
 # --- the command ----------------------------------------------------------------------------------

@@ -40,6 +40,7 @@ from .mass_starts import add_box, box_count, free_row, holds_part, part_row
 ITERATIONS = 10_000  # proposals at most (FW16)
 RESTARTS = 3
 HOPS = 300
+GAIN = 0.25  # of the rank: a round of starts that brings less is the last
 HOP = 1.5  # step length of a hop (m)
 FLUSH = 0.3  # share of resizes that make an edge flush with another box's
 SNAP = 0.10  # edges of two boxes closer than this are snapped (m)
@@ -287,14 +288,17 @@ def search(
 ) -> None:
     """Fill `pool` with the best layouts around the locked boxes of `base`.
 
-    rounds: of informed starts, at least. Where they and basin hopping leave an energy above
-    FW16's threshold, annealing from the best and from nothing has its turn.
+    rounds: of informed starts, at least; more while they help. Where they and basin hopping
+    leave an energy above FW16's threshold, annealing from the best and from nothing has its turn.
     """
     work = new_work()
+    before = np.inf
     for number in range(4 * rounds):
-        if number >= rounds and rank(pool.energies[0], pool.taste[0]) < NEAT:
-            break
         informed_round(pool, base, target, work, rng=rng)
+        reached = rank(pool.energies[0], pool.taste[0])
+        if number + 1 >= rounds and (reached < NEAT or reached > before - GAIN):
+            break
+        before = reached
     trace = np.zeros(1)
     layout = Layout(base.rows.copy(), base.kinds.copy(), base.locks.copy())
     hop(pool, target, work, rng=rng)

@@ -17,6 +17,7 @@ from .groups import Group, least_bdry
 from .network import Network
 from .physical import Columns, settle
 from .sampling import BLOCK, Draws
+from .shared_values import SharedValues, take_up
 
 ATTEMPTS = 40  # blocks without one possible draw before completion gives up
 
@@ -36,15 +37,21 @@ def completions(
     *,
     rng: np.random.Generator,
     style: int | None = None,
+    shared: tuple[SharedValues, ...] = (),
 ) -> Iterator[Completion]:
-    """Yield blocks of completions without end. Raises Infeasible where none is found."""
+    """Yield blocks of completions without end. Raises Infeasible where none is found.
+
+    shared: values that what is not given takes up again.
+    """
     row = read_attributes([given], network.layout, groups)
     fixed = tuple((~np.isnan(v)).astype(np.int8) for v in row.values)
     failures = 0
     while True:
         particles = draw_given(network, row, BLOCK, rng=rng, style=style)
         draws = resampled(particles, rng=rng)
-        possible = accept(draws.readings, network, given, fixed)
+        held = tuple(np.tile(f, (len(draws.style), 1)) for f in fixed)
+        take_up(draws.readings.values, shared, rng=rng, fixed=held)
+        possible = accept(draws.readings, network, given, held)
         if possible.any():
             failures = 0
             kept = replace(
@@ -58,10 +65,9 @@ def completions(
             raise Infeasible(f"{given.id}: none of {tried} draws meets what is given")
 
 
-def accept(rows: Readings, network: Network, given: Attributes, fixed: tuple[Bits, ...]) -> Masks:
-    """Settle rows in place and tell which (n,) are possible with what is given."""
+def accept(rows: Readings, network: Network, given: Attributes, held: tuple[Bits, ...]) -> Masks:
+    """Settle rows in place and tell which (n,) are possible with what is given (`held`)."""
     layout = network.layout
-    held = tuple(np.tile(f, (len(rows), 1)) for f in fixed)
     _solve(rows, layout_columns(rows, network), given)
     settle(rows.values, layout, held)
     columns = layout_columns(rows, network)
@@ -107,7 +113,7 @@ def _solve(rows: Readings, columns: Columns, given: Attributes) -> None:
     known = (*given.mass.bbox[:2], given.mass.bcr)
     if sides and given.mass.bdry is not None and None in known:
         w, d, bcr, x = sides
-        x[:] = given.mass.bdry / np.vectorize(least_bdry)(w, d, bcr)
+        x[:] = given.mass.bdry / least_bdry(w, d, bcr)
 
 
 # --- values as they came ------------------------------------------------------------------------

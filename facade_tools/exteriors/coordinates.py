@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..artifacts.attributes import Attributes
-from .groups import ABSENT, ATOM_TOLERANCE, GROUPS, UNKNOWN, Group, Reading, assemble, declared
+from .groups import ABSENT, ATOM_TOLERANCE, GROUPS, UNKNOWN, Group, Written, assemble, declared
 from .layout import GroupLayout, Layout
 
 Floats = NDArray[np.float64]
@@ -91,6 +91,17 @@ def _matrix(rows: Sequence[Sequence[float]], width: int, kind: Any) -> NDArray[A
     return np.array(rows, dtype=kind).reshape(len(rows), width)
 
 
+def columns_of(readings: Readings, layout: Layout, groups: tuple[Group, ...] = GROUPS) -> Written:
+    """Return the attributes of complete rows by name, each (n, …), parts that are absent 0."""
+    active = declared(layout.boundary, groups)
+    if is_merged(layout, active):
+        readings = split(readings, active)
+    columns: Written = {}
+    for values, group in zip(readings.values, active, strict=True):
+        group.write(columns, values)
+    return columns
+
+
 def write_attributes(
     readings: Readings,
     layout: Layout,
@@ -98,17 +109,16 @@ def write_attributes(
     groups: tuple[Group, ...] = GROUPS,
 ) -> Iterator[Attributes]:
     """Yield the attribute vectors of complete rows."""
-    active = declared(layout.boundary, groups)
-    if is_merged(layout, active):
-        readings = split(readings, active)
-    values = [v.tolist() for v in readings.values]
-    parts = [p.tolist() for p in readings.parts]
-    bits = readings.bits.tolist()
+    columns = columns_of(readings, layout, groups)
+    rows = {name: column.tolist() for name, column in columns.items()}
+    bits, heights = readings.bits.tolist(), storey_height.tolist()
     for n, identity in enumerate(readings.ids):
-        fields: dict[str, Any] = {}
-        for i, group in enumerate(active):
-            group.write(fields, Reading(tuple(values[i][n]), tuple(parts[i][n])))
-        yield assemble(identity, fields, _named_bits(bits[n], layout), float(storey_height[n]))
+        fields = {name: _tuples(column[n]) for name, column in rows.items()}
+        yield assemble(identity, fields, _named_bits(bits[n], layout), heights[n])
+
+
+def _tuples(value: Any) -> Any:
+    return tuple(map(_tuples, value)) if isinstance(value, list) else value
 
 
 def _named_bits(row: list[int], layout: Layout) -> dict[str, dict[str, int]]:

@@ -56,11 +56,21 @@ class Dataset:
 
 def group_data(x: Floats, dense: Masks, states: Bits, log_slope: Floats) -> GroupData:
     """Return a group's rows with their patterns found."""
-    masks, index = np.unique(dense, axis=0, return_inverse=True)
-    index = index.reshape(-1)
-    order = np.argsort(index, kind="stable").astype(np.int64)
-    starts = np.searchsorted(index[order], np.arange(len(masks) + 1)).astype(np.int64)
-    return GroupData(x, dense, states, log_slope, order, starts, masks)
+    code = _codes(dense)
+    order = np.argsort(code, kind="stable").astype(np.int64)
+    code = code[order]
+    first = np.flatnonzero(np.diff(code, prepend=-1)).astype(np.int64)
+    starts = np.append(first, len(code)).astype(np.int64)
+    return GroupData(x, dense, states, log_slope, order, starts, dense[order[first]])
+
+
+def _codes(dense: Masks) -> Ints:
+    """Return a number (n,) a pattern; numbers grow as the patterns do lexicographically."""
+    if dense.shape[1] < 62:  # a power of two a coordinate fits into 64 bits
+        powers = 1 << np.arange(dense.shape[1], dtype=np.int64)[::-1]
+        return np.asarray(dense @ powers, dtype=np.int64)
+    _, code = np.unique(dense, axis=0, return_inverse=True)
+    return np.asarray(code.reshape(-1), dtype=np.int64)
 
 
 def fit_scaling(readings: Readings, layout: Layout) -> tuple[Scaling, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from .network import Network
 from .physical import storey_heights
 from .sampling import draw_block
 from .serialisation import network_of
+from .shared_values import SharedValues, shared_values
 
 POOL = 2000  # draws of which --top keeps the most probable
 POOL_EACH = 50  # and at least this many for each that is kept
@@ -33,15 +35,18 @@ class SampleOptions:
 
     style: fixes S (from 0). top: only the most probable of many. min_distance: from training rows
     and earlier samples, root mean square standard deviations a coordinate. prefix: of the ids
-    `<prefix>-<index>`. neighbours: whether samples name the training rows nearest to them.
+    `<prefix>-<index>`, counted from `first`. neighbours: whether samples name the training rows
+    nearest to them. smooth: leave out values that training buildings share (`shared_values`).
     """
 
     style: int | None = None
     top: bool = False
     min_distance: float = 0.0
     prefix: str = "0"
+    first: int = 0
     groups: tuple[Group, ...] = GROUPS
     neighbours: bool = True
+    smooth: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +64,47 @@ class Block:
         return Block(rows, self.style[index], self.density[index], self.effective)
 
 
+@dataclass(frozen=True, slots=True)
+class Source:
+    """A model with everything that drawing from it needs."""
+
+    model: Model
+    network: Network
+    finder: Neighbours
+    shared: tuple[SharedValues, ...]
+    given: Attributes | None
+    options: SampleOptions
+
+
+def source_of(model: Model, given: Attributes | None, options: SampleOptions) -> Source:
+    """Return a source. Raises InvalidInput on a style that the model lacks."""
+    network = network_of(model)
+    if options.style is not None and options.style >= len(network.style):
+        count = len(network.style)
+        raise InvalidInput(f"style {options.style}; expected one of the model's {count}, from 0")
+    finder, shared = _lookups(_Key(model))
+    return Source(model, network, finder, () if options.smooth else shared, given, options)
+
+
+@dataclass(frozen=True)
+class _Key:
+    """A model compared by identity: trees over its training rows are built once."""
+
+    model: Model
+
+    def __hash__(self) -> int:
+        return id(self.model)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Key) and self.model is other.model
+
+
+@lru_cache(maxsize=4)
+def _lookups(key: _Key) -> tuple[Neighbours, tuple[SharedValues, ...]]:
+    network = network_of(key.model)
+    return Neighbours(key.model, network), shared_values(key.model, network)
+
+
 def sample_attributes(
     model: Model,
     n: int,
@@ -72,33 +118,36 @@ def sample_attributes(
     given: what is known of the building; it stays as it is, to the last bit. Raises InvalidInput
     on a style that the model lacks, Infeasible where nothing meets what is asked for.
     """
-    network = network_of(model)
-    if options.style is not None and options.style >= len(network.style):
-        count = len(network.style)
-        raise InvalidInput(f"style {options.style}; expected one of the model's {count}, from 0")
-    finder = Neighbours(model, network)
-    blocks = draw(network, rng, given, options)
-    chosen = top(blocks, n, finder, options) if options.top else blocks
+    source = source_of(model, given, options)
+    for first, block in taken_blocks(source, n, rng=rng):
+        yield from annotated(source, block, first)
+
+
+def taken_blocks(
+    source: Source, n: int, *, rng: np.random.Generator
+) -> Iterator[tuple[int, Block]]:
+    """Yield n rows in blocks, each with the index of its first row."""
+    options, blocks = source.options, draw(source, rng)
+    chosen = top(blocks, n, source.finder, options) if options.top else blocks
     if options.min_distance > 0 and not options.top:
-        chosen = apart(blocks, finder, options.min_distance)
+        chosen = apart(blocks, source.finder, options.min_distance)
     done = 0
     for block in chosen if n else ():
         rows = block.take(np.arange(min(len(block.style), n - done)))
-        yield from annotated(rows, done, finder, model.storey_height, given, options)
+        yield done, rows
         done += len(rows.style)
         if done >= n:
             return
 
 
-def draw(
-    network: Network, rng: np.random.Generator, given: Attributes | None, options: SampleOptions
-) -> Iterator[Block]:
+def draw(source: Source, rng: np.random.Generator) -> Iterator[Block]:
     """Yield blocks of complete rows without end."""
-    while given is None:
-        draws = draw_block(network, rng=rng, style=options.style)
+    network, options, shared = source.network, source.options, source.shared
+    while source.given is None:
+        draws = draw_block(network, rng=rng, style=options.style, shared=shared)
         yield Block(draws.readings, draws.style, log_density(network, draws.readings))
     found: Iterator[Completion] = completions(
-        network, given, options.groups, rng=rng, style=options.style
+        network, source.given, options.groups, rng=rng, style=options.style, shared=shared
     )
     for one in found:
         rows = one.draws.readings
@@ -156,23 +205,21 @@ def spread(points: Floats, others: Floats | None, distance: float, most: int) ->
     return np.array(kept, dtype=np.int64)
 
 
-def annotated(
-    block: Block,
-    first: int,
-    finder: Neighbours,
-    height: float,
-    given: Attributes | None,
-    options: SampleOptions,
-) -> Iterator[Attributes]:
-    """Yield rows as artifacts, ids counted from `first`; height: of a typical storey, metres."""
-    count = len(block.style)
-    ids = tuple(f"{options.prefix}-{first + i}" for i in range(count))
-    rows = replace(block.readings, ids=ids)
-    near = list(finder.nearest(rows)) if options.neighbours else []
-    heights = storey_heights(rows.values, finder.network.layout, height)
+def block_ids(source: Source, block: Block, first: int) -> tuple[str, ...]:
+    """Return the ids of a block's rows, counted from `first`."""
+    start, prefix = source.options.first + first, source.options.prefix
+    return tuple(f"{prefix}-{i}" for i in range(start, start + len(block.style)))
+
+
+def annotated(source: Source, block: Block, first: int) -> Iterator[Attributes]:
+    """Yield rows as artifacts, ids counted from `first`."""
+    rows = replace(block.readings, ids=block_ids(source, block, first))
+    layout, finder = source.network.layout, source.finder
+    near = list(finder.nearest(rows)) if source.options.neighbours else []
+    heights = storey_heights(rows.values, layout, source.model.storey_height)
     density, style = block.density.tolist(), block.style.tolist()
-    for i, row in enumerate(write_attributes(rows, finder.network.layout, heights, options.groups)):
+    for i, row in enumerate(write_attributes(rows, layout, heights, source.options.groups)):
         names = {name: finder.ids[index[i]] for name, index, _ in near if index[i] >= 0}
         note = Sample(style[i], density[i], names, block.effective)
-        whole = row if given is None else overlaid(row, given)
+        whole = row if source.given is None else overlaid(row, source.given)
         yield replace(whole, sample=note)

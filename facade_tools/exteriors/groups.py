@@ -9,8 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import inf, isinf, isnan, nan, sqrt
+from math import inf, nan, sqrt
 from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ..artifacts.attributes import (
     ROOF_BITS,
@@ -25,6 +28,8 @@ from ..artifacts.attributes import (
 Level = Literal["mass", "facade", "table"]
 Boundary = Literal["x", "bdry"]
 TransformName = Literal["identity", "log", "logit", "log-above-1"]
+Floats = NDArray[np.float64]
+Written = dict[str, Floats]
 
 ATOM_TOLERANCE = 1e-6
 METRES = 0.05  # least standard deviation of a length
@@ -57,15 +62,15 @@ class Group:
     """A group of continuous attributes under one hidden variable.
 
     parts: what may be absent (a garage), each with as many coordinates as the others, in order.
-    read: from an attribute vector. write: into the fields of an attribute vector; `fields` holds
-    what has been written so far.
+    read: from an attribute vector. write: values (n, coordinates), infinite where a part is absent,
+    into columns (n, …) of attribute vectors; they hold what has been written so far.
     """
 
     name: str
     level: Level
     coordinates: tuple[Coordinate, ...]
     read: Callable[[Attributes], Reading]
-    write: Callable[[dict[str, Any], Reading], None]
+    write: Callable[[Written, Floats], None]
     parts: tuple[str, ...] = ()
 
     def part_of(self, index: int) -> int:
@@ -92,16 +97,16 @@ def _read_bbox(a: Attributes) -> Reading:
     return Reading(tuple(map(_open, a.mass.bbox)))
 
 
-def _write_bbox(fields: dict[str, Any], r: Reading) -> None:
-    fields["bbox"] = r.values
+def _write_bbox(columns: Written, values: Floats) -> None:
+    columns["bbox"] = values
 
 
 def _read_bcr(a: Attributes) -> Reading:
     return Reading((_open(a.mass.bcr),))
 
 
-def _write_bcr(fields: dict[str, Any], r: Reading) -> None:
-    fields["bcr"] = r.values[0]
+def _write_bcr(columns: Written, values: Floats) -> None:
+    columns["bcr"] = values[:, 0]
 
 
 def _read_x(a: Attributes) -> Reading:
@@ -111,23 +116,25 @@ def _read_x(a: Attributes) -> Reading:
     return Reading((max(bdry * sqrt(bcr * w * d) / (2 * (w + d)), 1.0),))
 
 
-def least_bdry(w: float, d: float, bcr: float) -> float:
+def least_bdry(w: Floats, d: Floats, bcr: Floats) -> Floats:
     """Return perimeter over root of area of an orthogonally convex plan: no plan has less."""
-    return 2 * (w + d) / sqrt(w * d * bcr)
+    return np.asarray(2 * (w + d) / np.sqrt(w * d * bcr))
 
 
-def _write_x(fields: dict[str, Any], r: Reading) -> None:
-    w, d, _ = fields["bbox"]
-    fields["bdry"] = r.values[0] * least_bdry(w, d, fields["bcr"])
+def _least_bdry(columns: Written) -> Floats:
+    return least_bdry(columns["bbox"][:, 0], columns["bbox"][:, 1], columns["bcr"])
+
+
+def _write_x(columns: Written, values: Floats) -> None:
+    columns["bdry"] = values[:, 0] * _least_bdry(columns)
 
 
 def _read_bdry(a: Attributes) -> Reading:
     return Reading((_open(a.mass.bdry),))
 
 
-def _write_bdry(fields: dict[str, Any], r: Reading) -> None:
-    w, d, _ = fields["bbox"]
-    fields["bdry"] = max(r.values[0], least_bdry(w, d, fields["bcr"]))
+def _write_bdry(columns: Written, values: Floats) -> None:
+    columns["bdry"] = np.maximum(values[:, 0], _least_bdry(columns))
 
 
 def _read_r1(a: Attributes) -> Reading:
@@ -139,8 +146,8 @@ def _read_r1(a: Attributes) -> Reading:
     return Reading((UNKNOWN,))
 
 
-def _write_r1(fields: dict[str, Any], r: Reading) -> None:
-    fields["r1"] = r.values[0]
+def _write_r1(columns: Written, values: Floats) -> None:
+    columns["r1"] = values[:, 0]
 
 
 def _read_r2(a: Attributes) -> Reading:
@@ -152,12 +159,12 @@ def _read_r2(a: Attributes) -> Reading:
     return Reading((min(third / second, 1.0) if known else UNKNOWN,))  # type: ignore[operator]
 
 
-def _write_r2(fields: dict[str, Any], r: Reading) -> None:
-    r1 = fields.pop("r1")
-    r2 = 0.0 if isinf(r.values[0]) or r1 == 0 else r.values[0]
+def _write_r2(columns: Written, values: Floats) -> None:
+    r1 = columns.pop("r1")
+    r2 = np.where(np.isinf(values[:, 0]) | (r1 == 0), 0.0, values[:, 0])
     floors = 1.0 + r1 + r1 * r2
-    fields["far"] = fields["bcr"] * floors
-    fields["arf"] = (1.0 / floors, r1 / floors, r1 * r2 / floors)
+    columns["far"] = columns["bcr"] * floors
+    columns["arf"] = np.stack([1.0 / floors, r1 / floors, r1 * r2 / floors], axis=1)
 
 
 FAR_OUT = 10.0  # a part's centre is at most this many house widths away
@@ -183,17 +190,17 @@ def read_part(values: Sequence[float | None], present: bool | None) -> Reading:
     return Reading(tuple(map(_open, values)), (1,))
 
 
-def write_part(values: Sequence[float]) -> tuple[float, ...]:
-    """Return the numbers of a part: all 0 where it is absent."""
-    return tuple(0.0 if isinf(value) else value for value in values)
+def write_part(values: Floats) -> Floats:
+    """Return the numbers of a part (n, d): all 0 where it is absent."""
+    return np.where(np.isinf(values), 0.0, values)
 
 
 def _read_garage(a: Attributes) -> Reading:
     return read_part(a.mass.garage, a.present.garage if a.present else None)
 
 
-def _write_garage(fields: dict[str, Any], r: Reading) -> None:
-    fields["garage"] = write_part(r.values)
+def _write_garage(columns: Written, values: Floats) -> None:
+    columns["garage"] = write_part(values)
 
 
 def _read_porch(a: Attributes) -> Reading:
@@ -202,8 +209,8 @@ def _read_porch(a: Attributes) -> Reading:
     return Reading(front.values + back.values, front.parts + back.parts)
 
 
-def _write_porch(fields: dict[str, Any], r: Reading) -> None:
-    fields["porch"] = (write_part(r.values[:6]), write_part(r.values[6:]))
+def _write_porch(columns: Written, values: Floats) -> None:
+    columns["porch"] = write_part(values).reshape(len(values), 2, 6)
 
 
 # --- facades ------------------------------------------------------------------------------------
@@ -215,8 +222,8 @@ def _facade_group(name: str, atoms: tuple[float, ...]) -> Group:
     def read(a: Attributes) -> Reading:
         return Reading(tuple(map(_open, getattr(a.facade, name))))
 
-    def write(fields: dict[str, Any], r: Reading) -> None:
-        fields[name] = r.values
+    def write(columns: Written, values: Floats) -> None:
+        columns[name] = values
 
     rows = tuple(Coordinate(f"{name}.{side}", "logit", SHARE, atoms) for side in SIDES)
     return Group(name, "facade", rows, read, write)
@@ -274,8 +281,3 @@ def assemble(
 
 _MASS = ("bbox", "bcr", "bdry", "far", "arf", "garage", "porch")
 _FACADE = ("wwr", "sym", "align")
-
-
-def observed(value: float) -> bool:
-    """Tell whether a free coordinate carries a number."""
-    return not (isnan(value) or isinf(value))

@@ -60,8 +60,9 @@ class Target(NamedTuple):
 
     values: (27,); weights: (27,) of each squared difference, 0 where the value is unknown and only
     a hint to the search. extra: how many general boxes may be added to the locked ones. tower:
-    whether one box should suit a tower. zones: (n, 4) plan rectangles before observed walls,
-    where no box may stand that is not locked.
+    whether one box should suit a tower. styles: how many styles of roof the general boxes should
+    carry. zones: (n, 4) plan rectangles before observed walls, where no box may stand that is not
+    locked.
     """
 
     values: Floats
@@ -69,6 +70,7 @@ class Target(NamedTuple):
     storey_height: float
     extra: int
     tower: bool
+    styles: int
     zones: Rectangles
 
 
@@ -83,7 +85,8 @@ def target_of(attributes: Attributes, without: Iterable[str] = ()) -> Target:
         weights[place] = 0.0 if name in without else known[place] / norm
     tower = attributes.element.special.get("tower") == 1
     storey_height = float(attributes.storey_height)
-    return Target(values, weights, storey_height, MOST_BOXES, tower, np.empty((0, 4)))
+    styles = max(sum(bit == 1 for bit in attributes.element.roof.values()), 1) + tower
+    return Target(values, weights, storey_height, MOST_BOXES, tower, styles, np.empty((0, 4)))
 
 
 @compiled

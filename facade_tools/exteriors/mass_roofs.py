@@ -7,18 +7,21 @@ wings run into each other (geometry/solids.py takes the upper envelope of the bo
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..artifacts.attributes import ROOF_BITS, ElementAttributes
 from ..artifacts.building import Axis, Box, Chimney, Roof, RoofStyle
+from ..geometry.floors import FLOORS
 from .mass_taste import TOWER_RATIO, TOWER_WIDTH
 
 CHIMNEY = 0.7  # width of a chimney (m)
 CHIMNEY_ABOVE = 0.7  # a chimney's top above the highest roof it passes (m)
 CONE_PITCH = 58.0
+TOWER_STEP = 0.9  # a tower's eaves above those of the house, where the floors allow (m)
+TOP_STOREY = 2.3  # wall left to the top storey under a tower (m)
 STEEP_STOREY = 2.2  # a mansard's lower slope at most (m)
 
 
@@ -159,6 +162,37 @@ def with_tower(boxes: Sequence[Box], *, rng: np.random.Generator) -> tuple[Box, 
     names = {box.id for box in boxes}
     name = next(n for n in ("tower", "tower-2", "tower-3") if n not in names)
     return (*boxes, Box(name, "general", x, y, side, side, host.height))
+
+
+def under_tower(
+    boxes: Sequence[Box], kept: Collection[str], storey_height: float
+) -> tuple[Box, ...]:
+    """Return the boxes with the eaves of the others under the tower's, as far as floors allow.
+
+    A cone whose eaves are those of the house sinks into its roof. No floor comes or goes and the
+    top storey stays at least 2.3 m high, so that no mass attribute changes. kept: ids that stay.
+    """
+    tower = tower_of([box for box in boxes if box.kind == "general"])
+    if tower is None:
+        return tuple(boxes)
+    return tuple(
+        box
+        if box is tower or box.kind != "general" or box.id in kept
+        else replace(box, height=_stepped(box.height or 0.0, tower.height or 0.0, storey_height))
+        for box in boxes
+    )
+
+
+def _stepped(height: float, tower: float, storey_height: float) -> float:
+    below = sum(height > (floor + 0.5) * storey_height + 1e-6 for floor in range(1, FLOORS))
+    least = below * storey_height + max(TOP_STOREY, 0.5 * storey_height + 0.05)
+    return round(min(height, max(tower - TOWER_STEP, least)), 3)
+
+
+def missing_styles(element: ElementAttributes, boxes: Sequence[Box]) -> tuple[str, ...]:
+    """Return the roof styles that the bits ask for and no general box carries."""
+    there = {_style(box) for box in boxes if box.kind == "general" and box.roof}
+    return tuple(name for name in ROOF_BITS if element.roof.get(name) == 1 and name not in there)
 
 
 # --- chimneys -----------------------------------------------------------------------------------

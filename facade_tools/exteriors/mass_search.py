@@ -111,7 +111,7 @@ def settle(pool: Pool, layout: Layout, target: Target, work: Work) -> float:
     energy = layout_energy(layout, target, work)
     if valid(layout, target):
         _record(pool, energy)
-        offer(pool, layout, energy, clumsiness(layout, target.tower, work))
+        offer(pool, layout, energy, clumsiness(layout, target.tower, target.styles, work))
     return energy
 
 

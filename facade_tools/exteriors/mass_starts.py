@@ -218,7 +218,9 @@ def _with_top(target: Target, rng: np.random.Generator) -> Target:
     values[2] = max(top, (floors - 0.5) * storey + 0.01)
     if floors < FLOORS:
         values[2] = min(values[2], (floors + 0.5) * storey)
-    return Target(values, target.weights, storey, target.extra, target.tower, target.zones)
+    return Target(
+        values, target.weights, storey, target.extra, target.tower, target.styles, target.zones
+    )
 
 
 @compiled

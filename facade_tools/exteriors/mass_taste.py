@@ -100,15 +100,25 @@ def _towerless(layout: Layout) -> bool:
 
 
 @compiled
-def clumsiness(layout: Layout, tower: bool, work: Work) -> float:
+def _roofless(layout: Layout, styles: int) -> int:
+    """Return for how many roof styles there is no general box."""
+    for k in range(CAPACITY):
+        styles -= layout.kinds[k] == GENERAL
+    return max(styles, 0)
+
+
+@compiled
+def clumsiness(layout: Layout, tower: bool, styles: int, work: Work) -> float:
     """Return a penalty ≥ 0 (no unit) of a layout whose grid `work` describes.
 
-    tower: whether one box should be small and high enough to be a tower.
+    tower: whether one box should be small and high enough to be a tower. styles: how many
+    styles of roof the boxes have to carry.
     """
     total = 1.5 * _near_lines(layout) + 2.0 * _near_heights(layout)
     total += 2.0 * thinness(work, SLIM) + 4.0 * thinness(work, SLIVER)
     total += 0.12 * _corners(work)
     total += 3.0 if tower and _towerless(layout) else 0.0
+    total += 3.0 * _roofless(layout, styles)
     for k in range(CAPACITY):
         kind = layout.kinds[k]
         total += 0.35 if kind == GENERAL else 0.0

@@ -19,7 +19,14 @@ from .mass_energy import Target, layout_of, mass_energy, relative_residuals
 from .mass_hints import search_target
 from .mass_layout import EMPTY, GARAGE, GENERAL, Layout, move_to_origin
 from .mass_polish import round_layout
-from .mass_roofs import chimney_of, draw_roof_plan, roofed, with_tower
+from .mass_roofs import (
+    chimney_of,
+    draw_roof_plan,
+    missing_styles,
+    roofed,
+    under_tower,
+    with_tower,
+)
 from .mass_search import new_pool, pooled
 
 log = logging.getLogger("facade_tools.massgen")
@@ -160,6 +167,10 @@ def _free_name(name: str, taken: set[str]) -> str:
     return next(n for n in (name, *numbered) if n not in taken)
 
 
+def _ids(keep: Building | None) -> frozenset[str]:
+    return frozenset(box.id for box in keep.boxes) if keep else frozenset()
+
+
 def _finished(
     name: str,
     attributes: Attributes,
@@ -174,12 +185,17 @@ def _finished(
     wanted |= set(keep.features) if keep else set()
     tower = "tower" in wanted and not any(b.roof and b.roof.style == "cone" for b in mass.boxes)
     boxes = with_tower(mass.boxes, rng=rng) if tower else mass.boxes
+    boxes = under_tower(boxes, _ids(keep), attributes.storey_height) if tower else boxes
     boxes = roofed(boxes, draw_roof_plan(attributes.element, rng=rng), tower=tower)
     chimneys = keep.chimneys if keep else ()
     if "chimney" in wanted and not chimneys:
         chimney = chimney_of(boxes, rng=rng)
         chimneys = (chimney,) if chimney else ()
     cones = any(b.roof and b.roof.style == "cone" for b in boxes)
+    residuals = relative_residuals(mass.shares, MET)
+    if missing := missing_styles(attributes.element, boxes):
+        log.warning("%s: no box is left for a roof of style %s", name, " or ".join(missing))
+        residuals["roof"] = float(len(missing))
     features = [part for part, there in (("chimney", chimneys), ("tower", cones)) if there]
     return Building(
         id=name,
@@ -189,6 +205,6 @@ def _finished(
         features=tuple(part for part in features if part in wanted),
         chimneys=chimneys,
         targets=replace(attributes, provenance=None),
-        energy=Energy(mass=mass.energy, residuals=relative_residuals(mass.shares, MET)),
+        energy=Energy(mass=mass.energy, residuals=residuals),
         tags={"mass_energy_curve": mass.curve},
     )

@@ -24,7 +24,7 @@ class Neighbours:
         """Build a tree a group; a model without training rows finds nothing."""
         self.network = network
         self.ids = model.training.ids if model.training else ()
-        rows = _readings(model, network.layout) if self.ids else None
+        rows = training_readings(model, network.layout) if self.ids else None
         self._points = [] if rows is None else self._embed(rows)
         self._trees = [_tree(points) for points in self._points]
 
@@ -79,8 +79,8 @@ def embed(values: Floats, group: GroupLayout, center: Floats, scale: Floats) -> 
     return out
 
 
-def _readings(model: Model, layout: Layout) -> Readings:
-    """Return the rows that the model carries; null in a group with an absent part is absent."""
+def training_readings(model: Model, layout: Layout) -> Readings:
+    """Return the rows that a model carries; null in a group with an absent part is absent."""
     assert model.training is not None
     table = np.array(
         [[np.nan if x is None else x for x in row] for row in model.training.values],

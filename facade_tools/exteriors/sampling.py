@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
 
@@ -14,6 +13,7 @@ from .groups import ABSENT
 from .layout import GroupLayout, Layout
 from .network import Family, Network, bit_log_density, topological
 from .physical import settle
+from .shared_values import SharedValues, take_up
 
 BLOCK = 1024
 
@@ -26,16 +26,17 @@ class Draws:
     style: Ints
 
 
-def draw_blocks(
-    network: Network, *, rng: np.random.Generator, style: int | None = None
-) -> Iterator[Draws]:
-    """Yield blocks of draws without end; `style` fixes S."""
-    while True:
-        yield draw_block(network, rng=rng, style=style)
+def draw_block(
+    network: Network,
+    *,
+    rng: np.random.Generator,
+    style: int | None = None,
+    shared: tuple[SharedValues, ...] = (),
+) -> Draws:
+    """Return one block of ancestral draws, moved onto what is possible; `style` fixes S.
 
-
-def draw_block(network: Network, *, rng: np.random.Generator, style: int | None = None) -> Draws:
-    """Return one block of ancestral draws, moved onto what is possible."""
+    shared: values that draws take up again.
+    """
     styles = pick(np.tile(network.style, (BLOCK, 1)), rng)
     if style is not None:
         styles = np.full(BLOCK, style)
@@ -43,6 +44,7 @@ def draw_block(network: Network, *, rng: np.random.Generator, style: int | None 
     drawn = draw_groups(network, styles, rng)
     values = tuple(v for v, _ in drawn)
     parts = tuple(p for _, p in drawn)
+    take_up(values, shared, rng=rng)
     settle(values, network.layout)
     return Draws(Readings(("",) * BLOCK, values, parts, bits), styles)
 

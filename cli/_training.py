@@ -26,6 +26,7 @@ def run_training(
         raise click.UsageError("Missing option '-o': name a .npz file.")
     options = TrainOptions(
         features=values["features"], stages=values["stages"], height=values["height"],
+        coarse=min(values["coarse"], values["height"]),
         pixels=values["pixels"], augment=values["augment"], balance=values["balance"],
         boost=BoostOptions(rounds=values["rounds"]),
         forest=ForestOptions(values["trees"], values["depth"], values["patch"]),

@@ -24,10 +24,12 @@ from . import _options
               help="Stages of auto-context.")  # fmt: skip
 @click.option("--rounds", type=click.IntRange(1, 2000), default=60, show_default=True,
               help="Trees a class and stage.")  # fmt: skip
-@click.option("--pixels", type=click.IntRange(10, 10**6), default=1000, show_default=True,
-              help="Pixels sampled a picture.")  # fmt: skip
-@click.option("--height", type=click.IntRange(32, 2000), default=288, show_default=True,
+@click.option("--pixels", type=click.IntRange(10, 10**6), default=2000, show_default=True,
+              help="Pixels sampled a picture and stage.")  # fmt: skip
+@click.option("--height", type=click.IntRange(32, 2000), default=576, show_default=True,
               help="Working resolution: rows of a picture, pixels.")  # fmt: skip
+@click.option("--coarse", type=click.IntRange(32, 2000), default=288, show_default=True,
+              help="Rows that all stages but the last see; at most --height, pixels.")  # fmt: skip
 @click.option("--augment", type=click.IntRange(0, 20), default=0, show_default=True,
               help="Varied copies a picture: mirror, light, blur, perspective.")  # fmt: skip
 @click.option("--balance", type=click.FloatRange(0, 1), default=0.0, show_default=True,

@@ -25,7 +25,7 @@ from facade_tools.segmentation.trees import Node, add_scores, packed
 SMALL = BoostOptions(rounds=6, leaves=8, depth=5, least=5)
 
 
-def rendered(seed, width=80, height=96):
+def rendered(seed, width=110, height=160):
     rng = np.random.default_rng(seed)
     _, picture, labels = render_facade(builtin("haussmann"), width, height, rng=rng)
     return Pair(f"p{seed}", picture, labels)
@@ -38,13 +38,13 @@ def pairs():
 
 @pytest.fixture(scope="module")
 def trained(pairs):
-    options = TrainOptions(stages=2, height=96, pixels=500, boost=SMALL)
+    options = TrainOptions(stages=2, height=160, coarse=96, pixels=1500, boost=SMALL)
     return train(pairs, options, rng=np.random.default_rng(0))
 
 
 @pytest.fixture(scope="module")
 def forest(pairs):
-    options = TrainOptions("patch", height=96, pixels=300, forest=ForestOptions(3, 6, 7))
+    options = TrainOptions("patch", coarse=160, pixels=1000, forest=ForestOptions(3, 10, 7))
     return train(pairs, options, rng=np.random.default_rng(0))
 
 
@@ -75,8 +75,20 @@ def test_packed_trees_score_as_the_linked_ones(classes):
     np.testing.assert_allclose(trees.scores(codes), expected, atol=1e-5)
     plain = np.zeros((150, 3), np.float32)
     arrays = (trees.feature, trees.threshold, trees.child, trees.value, trees.root, trees.depth)
-    add_scores.py_func(codes, *arrays, plain)
+    add_scores.py_func(codes, *arrays, np.inf, plain)
     np.testing.assert_allclose(plain, trees.scores(codes), atol=1e-5)
+
+
+def test_decided_pixels_keep_their_class():
+    rng = np.random.default_rng(0)
+    trees = packed([random_tree(rng, 6, 1) for _ in range(120)], 3)
+    codes = rng.integers(0, 256, (200, 9)).astype(np.uint8)
+    whole, early = trees.scores(codes), trees.scores(codes, 15.0)
+    skipped = (whole != early).any(axis=1)
+    assert 0 < skipped.sum() < 200
+    lead = np.diff(np.sort(early, axis=1)[:, -2:], axis=1)[:, 0]
+    assert (lead[skipped] > 15.0).all()
+    np.testing.assert_array_equal(whole[~skipped], early[~skipped])
 
 
 def test_exported_trees_predict_what_lightgbm_does():
@@ -148,7 +160,9 @@ def test_classifiers_learn_round_trip_and_are_the_same_again(kind, request, pair
 
 
 def test_training_is_deterministic(pairs):
-    options = TrainOptions(stages=2, height=96, pixels=200, augment=1, balance=0.5, boost=SMALL)
+    options = TrainOptions(
+        stages=2, height=96, coarse=48, pixels=200, augment=1, balance=0.5, boost=SMALL
+    )
     one = train(pairs[:2], options, rng=np.random.default_rng(3))
     assert save(one) == save(train(pairs[:2], options, rng=np.random.default_rng(3)))
 

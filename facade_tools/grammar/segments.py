@@ -50,10 +50,12 @@ def moves(machine: Automaton) -> Moves:
     """Return an automaton as arrays."""
     count = len(machine.symbols)
     allowed = np.zeros((count, count), np.bool_)
+    first, last = np.zeros((2, count), np.bool_)
     for before, afters in machine.follow.items():
         allowed[before, list(afters)] = True
-    ends = [np.isin(np.arange(count), list(states)) for states in (machine.first, machine.last)]
-    return Moves(allowed, *ends)
+    first[list(machine.first)] = True
+    last[list(machine.last)] = True
+    return Moves(allowed, first, last)
 
 
 def chain(count: int) -> Moves:

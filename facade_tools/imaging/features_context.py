@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,6 +16,8 @@ BLURS = (2.0, 6.0)  # pixels
 RUNS = (31, 101)  # pixels
 STEPS = (5, 10, 20, 36, 60)  # pixels
 GAIN = np.float32(255.0)
+PROFILE = 8  # pixels of a row or column that are averaged where lines are compared
+ALIKE = np.float32(0.15)  # of the mean squared distance of two lines: those count as alike
 
 
 def context_features(probabilities: Probabilities) -> Features:
@@ -27,6 +30,39 @@ def context_features(probabilities: Probabilities) -> Features:
     (4, 6)
     """
     return stacked([GAIN * plane for one in probabilities for plane in _planes(one)])
+
+
+def belief_features(probabilities: Probabilities) -> Features:
+    """Return beliefs as planes of bytes."""
+    return stacked([GAIN * one for one in probabilities])
+
+
+def repeated(probabilities: Probabilities) -> list[Probabilities]:
+    """Return beliefs averaged over columns that are alike, rows that are alike, and both.
+
+    A facade repeats: what hides one window, or blurs its edge, is told by the others of its row
+    and column. Lines weigh exp(−d²/(0.15 · mean d²)) with d the distance of their beliefs.
+
+    >>> [one.shape for one in repeated(np.full((2, 4, 6), 0.5, np.float32))]
+    [(2, 4, 6), (2, 4, 6), (2, 4, 6)]
+    """
+    upright = _likeness(probabilities)
+    lying = _likeness(np.ascontiguousarray(probabilities.transpose(0, 2, 1)))
+    across = probabilities @ upright.T
+    return [across, lying @ probabilities, lying @ across]
+
+
+def _likeness(probabilities: Probabilities) -> NDArray[np.float32]:
+    """Return (width, width) weights of columns in the average of each column."""
+    _, height, width = probabilities.shape
+    size = (width, max(1, height // PROFILE))
+    short = [cv2.resize(one, size, interpolation=cv2.INTER_AREA) for one in probabilities]
+    lines = np.concatenate(short).T.astype(np.float32)
+    square = (lines * lines).sum(axis=1)
+    distance = np.maximum(square[:, None] + square - 2 * (lines @ lines.T), 0)
+    weight = np.exp(-distance / np.maximum(ALIKE * distance.mean(), np.float32(1e-6)))
+    shares: NDArray[np.float32] = weight / weight.sum(axis=1, keepdims=True)
+    return shares
 
 
 def _planes(one: Plane) -> Iterator[Plane]:

@@ -1,4 +1,8 @@
-"""Auto-context: each stage of the classifier also sees what the stage before believes."""
+"""Auto-context: each stage of the classifier also sees what the stage before believes.
+
+All stages but the last look at a coarse picture and only give context; the last one looks at the
+picture itself, where the context leaves doubt.
+"""
 
 from __future__ import annotations
 
@@ -10,29 +14,53 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..imaging.features import Features, Picture, pixel_features
-from ..imaging.features_context import Probabilities, context_features
-from .trees import Codes, Trees, softmax
+from ..imaging.features_context import (
+    Probabilities,
+    belief_features,
+    context_features,
+    repeated,
+)
+from ..imaging.image_io import fitted
+from .final import finished, planes_of
+from .trees import LEAD, Codes, Trees, softmax
 
 Labels = NDArray[np.uint8]  # (height, width), 0 is ignored, k is class k - 1
 
 EARLY_STRIDE = 3  # early stages only give context, which is smooth
+COARSE_PIXELS = 160_000
 
 Fit = Callable[[Codes, NDArray[np.intp]], Trees]
 
 
 @dataclass(frozen=True, slots=True)
 class Example:
-    """A picture at working resolution and its label map; variants of a picture share its `fold`."""
+    """A picture and its label map, and both at the resolution of the early stages.
+
+    Variants of a picture share its `fold`.
+    """
 
     picture: Picture
     labels: Labels
+    coarse: Picture
+    coarse_labels: Labels
     fold: int
 
 
+def example(picture: Picture, labels: Labels, height: int, fold: int) -> Example:
+    """Return an example whose early stages work at `height` rows."""
+    coarse = fitted(picture, height, COARSE_PIXELS)
+    size = (coarse.shape[1], coarse.shape[0])
+    small = cv2.resize(labels, size, interpolation=cv2.INTER_NEAREST).astype(np.uint8)
+    return Example(picture, labels, coarse, small, fold)
+
+
 def features_of(picture: Picture, before: Probabilities | None) -> Features:
-    """Return all planes that a stage sees; `before` is the belief of the stage before."""
+    """Return all planes that an early stage sees; `before` is the belief of the stage before."""
     planes = pixel_features(picture)
-    return planes if before is None else np.concatenate([planes, context_features(before)])
+    if before is None:
+        return planes
+    means = [belief_features(one) for one in repeated(before)]
+    return np.concatenate([planes, context_features(before), *means])
 
 
 def predict(trees: Trees, features: Features, stride: int = 1) -> Probabilities:
@@ -40,7 +68,7 @@ def predict(trees: Trees, features: Features, stride: int = 1) -> Probabilities:
     count, height, width = features.shape
     asked = features[:, ::stride, ::stride]
     codes = np.ascontiguousarray(asked.reshape(count, -1).T)
-    shares = np.ascontiguousarray(softmax(trees.scores(codes)).T)
+    shares = np.ascontiguousarray(softmax(trees.scores(codes, LEAD)).T)
     coarse = shares.reshape(-1, *asked.shape[1:])
     return coarse if stride == 1 else _between(coarse, stride, (height, width))
 
@@ -55,23 +83,23 @@ def _between(coarse: Probabilities, stride: int, shape: tuple[int, int]) -> Prob
     return np.stack(planes)
 
 
-def run_stages(stages: Sequence[Trees], picture: Picture) -> Probabilities:
-    """Return the belief of the last stage about a picture at working resolution."""
-    pixels = pixel_features(picture)
+def run_stages(stages: Sequence[Trees], picture: Picture, height: int) -> Probabilities:
+    """Return the belief of the last stage about a picture; the others see `height` rows of it."""
+    coarse = fitted(picture, height, COARSE_PIXELS)
     before: Probabilities | None = None
-    for number, trees in enumerate(stages, 1):
-        planes = pixels if before is None else np.concatenate([pixels, context_features(before)])
-        before = predict(trees, planes, 1 if number == len(stages) else EARLY_STRIDE)
-    assert before is not None
-    return before
+    for trees in stages[:-1]:
+        before = predict(trees, features_of(coarse, before), EARLY_STRIDE)
+    return finished(stages[-1], planes_of(picture, coarse, before))
 
 
-def sample_pixels(labels: Labels, count: int, rng: np.random.Generator) -> NDArray[np.intp]:
-    """Return flat indices of at most `count` labelled pixels."""
-    known = np.flatnonzero(labels)
-    if len(known) <= count:
-        return known
-    return np.sort(rng.choice(known, count, replace=False))
+def sample_pixels(
+    known: NDArray[np.bool_], count: int, rng: np.random.Generator
+) -> NDArray[np.intp]:
+    """Return flat indices of at most `count` of the pixels that are set."""
+    at = np.flatnonzero(known)
+    if len(at) <= count:
+        return at
+    return np.sort(rng.choice(at, count, replace=False))
 
 
 def train_stages(
@@ -82,22 +110,23 @@ def train_stages(
     The belief that a stage trains on comes from models that did not see the picture: the stage
     before is trained once for each fold without it, and once on everything to be kept.
     """
-    chosen = [sample_pixels(e.labels, pixels, rng) for e in examples]
-    labels = [
-        e.labels.ravel()[at].astype(np.intp) - 1 for e, at in zip(examples, chosen, strict=True)
-    ]
     before: list[Probabilities | None] = [None] * len(examples)
     kept: list[Trees] = []
-    for stage in range(stages):
+    for _ in range(stages - 1):
+        chosen = [sample_pixels(e.coarse_labels > 0, pixels, rng) for e in examples]
         codes = [_codes(e, b, at) for e, b, at in zip(examples, before, chosen, strict=True)]
+        labels = [
+            e.coarse_labels.ravel()[at].astype(np.intp) - 1
+            for e, at in zip(examples, chosen, strict=True)
+        ]
         kept.append(fit(np.concatenate(codes), np.concatenate(labels)))
-        if stage + 1 < stages:
-            before = list(_left_out(examples, before, codes, labels, fit))
+        before = list(_left_out(examples, before, codes, labels, fit))
+    kept.append(_last_stage(examples, before, fit, pixels, rng))
     return tuple(kept)
 
 
 def _codes(example: Example, before: Probabilities | None, at: NDArray[np.intp]) -> Codes:
-    planes = features_of(example.picture, before)
+    planes = features_of(example.coarse, before)
     return np.ascontiguousarray(planes.reshape(len(planes), -1)[:, at].T)
 
 
@@ -116,4 +145,21 @@ def _left_out(
             np.concatenate([codes[i] for i in rest]), np.concatenate([labels[i] for i in rest])
         )
     for example, belief in zip(examples, before, strict=True):
-        yield predict(models[example.fold], features_of(example.picture, belief), EARLY_STRIDE)
+        yield predict(models[example.fold], features_of(example.coarse, belief), EARLY_STRIDE)
+
+
+def _last_stage(
+    examples: Sequence[Example],
+    before: Sequence[Probabilities | None],
+    fit: Fit,
+    pixels: int,
+    rng: np.random.Generator,
+) -> Trees:
+    """Train on pixels that the stages before leave in doubt."""
+    codes, labels = [], []
+    for example, belief in zip(examples, before, strict=True):
+        planes = planes_of(example.picture, example.coarse, belief)
+        at = sample_pixels(planes.doubtful() & (example.labels > 0), pixels, rng)
+        codes.append(planes.codes(at))
+        labels.append(example.labels.ravel()[at].astype(np.intp) - 1)
+    return fit(np.concatenate(codes), np.concatenate(labels))

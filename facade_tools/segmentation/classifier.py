@@ -26,7 +26,7 @@ FORMAT = "facade-tools/classifier/1"
 MAX_BYTES = 256 << 20
 MAX_NODES = 20_000_000
 MAX_CLASSES = 100
-MAX_PIXELS = 160_000  # at working resolution
+MAX_PIXELS = 400_000  # at working resolution
 KINDS = ("context", "patch")
 
 _ARRAYS = {
@@ -40,13 +40,15 @@ class Classifier:
     """Stages of trees over pixel features.
 
     kind: `context` (features of the picture, then of the beliefs too) or `patch` (the paper's
-    forest). height: rows of the working resolution. patch: side of the patches. about: free notes.
+    forest). height: rows of the working resolution. coarse: rows at which all stages but the last
+    look at the picture. patch: side of the patches. about: free notes.
     """
 
     kind: str
     classes: tuple[str, ...]
     stages: tuple[Trees, ...]
     height: int
+    coarse: int
     patch: int = 0
     about: str = ""
 
@@ -57,7 +59,7 @@ class Classifier:
     def probabilities(self, working: Picture) -> Probabilities:
         """Return class probabilities (classes, height, width) of a picture at working size."""
         if self.kind == "context":
-            return run_stages(self.stages, working)
+            return run_stages(self.stages, working, self.coarse)
         codes = patch_codes(working, patch_tests(self.patch))
         shares = self.stages[0].scores(codes)
         shares /= np.maximum(shares.sum(axis=1, keepdims=True), np.float32(1e-9))
@@ -71,6 +73,7 @@ def save(classifier: Classifier) -> bytes:
         "kind": np.array(classifier.kind),
         "classes": np.array(classifier.classes),
         "height": np.array(classifier.height),
+        "coarse": np.array(classifier.coarse),
         "patch": np.array(classifier.patch),
         "about": np.array(classifier.about),
     }
@@ -113,7 +116,8 @@ def decoded(data: bytes) -> Classifier:
     try:
         if str(arrays["format"]) != FORMAT:
             raise InvalidInput(f"is {str(arrays['format'])[:40]!r}; expected {FORMAT}")
-        kind, height, patch = str(arrays["kind"]), int(arrays["height"]), int(arrays["patch"])
+        kind = str(arrays["kind"])
+        height, coarse, patch = (int(arrays[name]) for name in ("height", "coarse", "patch"))
         classes = tuple(str(name) for name in np.atleast_1d(arrays["classes"]))
         about = str(arrays["about"])
         count = sum(name.startswith("feature") for name in arrays)
@@ -124,9 +128,9 @@ def decoded(data: bytes) -> Classifier:
         raise InvalidInput("holds arrays of other types; expected a classifier") from None
     if kind not in KINDS or not stages or not 1 < len(classes) <= MAX_CLASSES:
         raise InvalidInput("is no classifier of a known kind")
-    if not 16 <= height <= 4096 or not (0 <= patch <= 101):
+    if not 16 <= coarse <= height <= 4096 or not 0 <= patch <= 101:
         raise InvalidInput("has a working resolution out of range")
-    return Classifier(kind, classes, stages, height, patch, about)
+    return Classifier(kind, classes, stages, height, coarse, patch, about)
 
 
 def _arrays(data: bytes) -> dict[str, NDArray[Any]]:

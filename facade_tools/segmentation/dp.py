@@ -17,6 +17,7 @@ from ..grammar.segments import Cut, best_cut, chain, moves
 from .energy import (
     Field,
     Layout,
+    coarsened,
     column_costs,
     column_limits,
     column_prior,
@@ -24,9 +25,12 @@ from .energy import (
     row_limits,
     state_costs,
 )
+from .refining import enlarged, refined
 
 STARTS = (0.0, 0.1, 0.3, 0.6)
 MAX_ROUNDS = 30
+COARSE = (288, 600)  # rows and columns of a field that is solved as it is
+REACH = 3  # coarse pixels that a border may move on the fine field
 GAIN = 1e-6  # nats: less is no improvement
 
 
@@ -47,6 +51,21 @@ class Solution:
 
 def solve(field: Field, plan: Plan) -> Solution:
     """Return the best of several alternations. Raises Infeasible where no facade fits.
+
+    A field of many rows is solved on squares of pixels first; then every border finds its pixel.
+    """
+    factor = max(-(-side // most) for side, most in zip(field.shape, COARSE, strict=True))
+    if factor == 1:
+        return _solve(field, plan)
+    coarse = _solve(coarsened(field, factor), plan)
+    layout = enlarged(coarse.layout, factor, field.shape)
+    layout = refined(field, plan, layout, REACH * factor)
+    reached = energy(field, plan, layout)
+    return Solution(layout, reached, (*coarse.trace, reached), relaxed_bound(field, plan))
+
+
+def _solve(field: Field, plan: Plan) -> Solution:
+    """Alternate from several starts on the field as it is.
 
     A grammar whose floors derive each for itself goes on from every start and from its best
     common columns.
@@ -98,13 +117,15 @@ def _relaxed(field: Field, plan: Plan) -> tuple[NDArray[np.float64], NDArray[np.
 
     The first bounds every layout from below: the columns are forgotten.
     """
-    free, mean = [], []
+    known: dict[tuple[int, ...], tuple[NDArray[np.float64], NDArray[np.float64]]] = {}
+    pairs = []
     for state in plan.states:
-        planes = sorted({field.label[label] for label in state.labels})
-        table = field.cost[planes]
-        free.append(table.min(axis=0).sum(axis=1))
-        mean.append(table.mean(axis=0).sum(axis=1))
-    return np.array(free), np.array(mean)
+        planes = tuple(sorted({field.label[label] for label in state.labels}))
+        if planes not in known:
+            table = field.cost[list(planes)]
+            known[planes] = (table.min(axis=0).sum(axis=1), table.mean(axis=0).sum(axis=1))
+        pairs.append(known[planes])
+    return np.array([pair[0] for pair in pairs]), np.array([pair[1] for pair in pairs])
 
 
 def _solve_rows(field: Field, plan: Plan, costs: NDArray[np.float64]) -> Cut:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..compiled import compiled
 from ..errors import InvalidInput
 from ..grammar.plan import Plan
 from ..grammar.segments import Bounds, Cut, bounds, size_cost
@@ -59,22 +60,24 @@ def field_of(probabilities: NDArray[np.float32], classes: Sequence[str], plan: P
             known = ", ".join(classes)
             raise InvalidInput(f"label {label!r} is unknown to the classifier ({known})")
     planes = probabilities[[classes.index(label) for label in plan.labels], ::-1]
-    cost = -np.log(np.maximum(planes.astype(np.float64), LEAST_PROBABILITY))
+    cost = -np.log(np.maximum(planes, np.float32(LEAST_PROBABILITY)).astype(np.float64))
+    return _field(cost, {label: i for i, label in enumerate(plan.labels)})
+
+
+def _field(cost: NDArray[np.float64], label: dict[str, int]) -> Field:
     across = np.zeros((*cost.shape[:2], cost.shape[2] + 1))
     np.cumsum(cost, axis=2, out=across[:, :, 1:])
     up = np.zeros((cost.shape[0], cost.shape[1] + 1, cost.shape[2]))
     np.cumsum(cost, axis=1, out=up[:, 1:])
-    return Field(cost, across, up, {label: i for i, label in enumerate(plan.labels)})
+    return Field(cost, across, up, label)
 
 
-def row_costs(field: Field, columns: Cut, kinds: int) -> NDArray[np.float64]:
-    """Return (labels, height, kinds): cost of a row's pixels in the columns of each kind."""
-    at = np.asarray(columns.bounds)
-    parts = field.across[:, :, at[1:]] - field.across[:, :, at[:-1]]
-    member = np.zeros((len(columns.states), kinds))
-    member[np.arange(len(columns.states)), columns.states] = 1.0
-    sums: NDArray[np.float64] = parts @ member
-    return sums
+def coarsened(field: Field, factor: int) -> Field:
+    """Return a field whose pixels are sums over squares of `factor` pixels, cut off at the ends."""
+    height, width = field.shape
+    rows = np.add.reduceat(field.cost, np.arange(0, height, factor), axis=1)
+    cost = np.add.reduceat(rows, np.arange(0, width, factor), axis=2)
+    return _field(cost, field.label)
 
 
 def state_costs(
@@ -82,19 +85,51 @@ def state_costs(
 ) -> NDArray[np.float64]:
     """Return (states, height): cost of each row under each state; columns[i] are state i's."""
     height = field.shape[0]
-    out = np.empty((len(states), height))
-    sums: dict[int, NDArray[np.float64]] = {}
-    for i, (number, cut) in enumerate(zip(states, columns, strict=True)):
-        state = plan.states[number]
-        planes = [field.label[label] for label in state.labels]
+    whole = [(0, height)] * len(states)
+    return span_costs(field, plan, states, columns, whole)
+
+
+def span_costs(
+    field: Field,
+    plan: Plan,
+    states: Sequence[int],
+    columns: Sequence[Cut | None],
+    spans: Sequence[tuple[int, int]],
+) -> NDArray[np.float64]:
+    """Return (states, height): cost of rows under each state within its span, 0 elsewhere."""
+    height, width = field.shape
+    plane: list[int] = []
+    border: list[tuple[int, int]] = []
+    first = [0]
+    for number, cut in zip(states, columns, strict=True):
+        labels = [field.label[label] for label in plan.states[number].labels]
         if cut is None:
-            out[i] = field.across[planes[0], :, -1]
-            continue
-        if id(cut) not in sums:
-            sums[id(cut)] = row_costs(field, cut, len(planes))
-        table = sums[id(cut)]
-        out[i] = table[planes, :, np.arange(len(planes))].sum(axis=0)
+            plane.append(labels[0])
+            border.append((0, width))
+        else:
+            plane += [labels[kind] for kind in cut.states]
+            border += zip(cut.bounds, cut.bounds[1:], strict=False)
+        first.append(len(plane))
+    out = np.zeros((len(states), height))
+    parts = (np.array(plane, np.int64), np.array(border, np.int64), np.array(first, np.int64))
+    _sum_rows(field.across, *parts, np.array(spans, np.int64), out)
     return out
+
+
+@compiled
+def _sum_rows(
+    across: NDArray[np.float64],
+    plane: NDArray[np.int64],
+    border: NDArray[np.int64],
+    first: NDArray[np.int64],
+    spans: NDArray[np.int64],
+    out: NDArray[np.float64],
+) -> None:
+    for i in range(out.shape[0]):
+        for y in range(spans[i, 0], spans[i, 1]):
+            for k in range(first[i], first[i + 1]):
+                row = across[plane[k], y]
+                out[i, y] += row[border[k, 1]] - row[border[k, 0]]
 
 
 def column_costs(

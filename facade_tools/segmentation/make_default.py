@@ -12,8 +12,8 @@ from .classifier import Classifier
 from .painting import render_facade
 from .training import Pair, TrainOptions, train
 
-GRAMMARS = ("haussmann", "haussmann-floors", "plain")
-HEIGHT = 288  # pixels, the working resolution
+GRAMMARS = ("haussmann", "haussmann-floors", "haussmann-floors", "plain")
+HEIGHTS = (300, 640)  # pixels
 
 
 def rendered_pairs(count: int, seed: int) -> Iterator[Pair]:
@@ -21,13 +21,14 @@ def rendered_pairs(count: int, seed: int) -> Iterator[Pair]:
     grammars = [builtin(name) for name in GRAMMARS]
     for number in range(count):
         rng = item_generator(seed, "render", number)
-        width = int(rng.integers(90, 330))
-        _, picture, labels = render_facade(grammars[number % len(grammars)], width, HEIGHT, rng=rng)
+        height = int(rng.integers(*HEIGHTS))
+        width = int(height * rng.uniform(0.35, 1.1))
+        _, picture, labels = render_facade(grammars[number % len(grammars)], width, height, rng=rng)
         yield Pair(f"rendered-{number}", picture, labels)
 
 
-def make_default(count: int = 72, seed: int = 0) -> Classifier:
+def make_default(count: int = 120, seed: int = 0) -> Classifier:
     """Return the classifier trained on `count` rendered facades."""
     pairs = list(rendered_pairs(count, seed))
     rng: np.random.Generator = item_generator(seed, "default-classifier")
-    return train(pairs, TrainOptions(stages=2, pixels=700), rng=rng)
+    return train(pairs, TrainOptions(stages=2, pixels=800), rng=rng)

@@ -77,7 +77,7 @@ def train_forest(
     tests = patch_tests(options.patch)
     rows, labels = [], []
     for picture, label in pictures:
-        at = sample_pixels(label, pixels, rng)
+        at = sample_pixels(label > 0, pixels, rng)
         rows.append(patch_codes(picture, tests, at))
         labels.append(label.ravel()[at].astype(np.intp) - 1)
     forest = RandomForestClassifier(

@@ -15,7 +15,7 @@ from ..errors import InvalidInput
 from ..imaging.features import Picture
 from ..imaging.image_io import PICTURES, fitted, read_photo
 from .augmentation import varied
-from .autocontext import Example, Labels, train_stages
+from .autocontext import Example, Labels, example, train_stages
 from .boosting import BoostOptions, train_boosted
 from .classifier import MAX_PIXELS, Classifier
 from .conventions import Convention
@@ -29,16 +29,17 @@ MAX_PICTURES = 100_000
 class TrainOptions:
     """How a classifier is trained.
 
-    features: `context` or `patch`. stages: of auto-context. height: working resolution, pixels.
-    pixels: sampled a picture and variant. inner: folds by picture for the beliefs that later
-    stages train on. augment: varied copies a picture. balance: 0 weighs pixels equally, 1 gives
-    each class the same weight.
+    features: `context` or `patch`. stages: of auto-context. height: working resolution, rows.
+    coarse: rows at which all stages but the last look. pixels: sampled a picture, variant and
+    stage. inner: folds by picture for the beliefs that later stages train on. augment: varied
+    copies a picture. balance: 0 weighs pixels equally, 1 gives each class the same weight.
     """
 
     features: str = "context"
     stages: int = 3
-    height: int = 288
-    pixels: int = 1000
+    height: int = 576
+    coarse: int = 288
+    pixels: int = 2000
     inner: int = 2
     augment: int = 0
     balance: float = 0.0
@@ -77,8 +78,9 @@ def train(pairs: Sequence[Pair], options: TrainOptions, *, rng: np.random.Genera
     """Return a classifier of the labels in `pairs`. Raises InvalidInput on fewer than two."""
     present = np.zeros(len(LABELS), np.bool_)
     small = []
+    height = options.coarse if options.features == "patch" else options.height
     for pair in pairs:
-        small.append(_working(pair, options.height))
+        small.append(_working(pair, height))
         present[np.unique(small[-1].labels)] = True
     known = [i for i in range(1, len(LABELS)) if present[i]]
     if len(known) < 2 or len(pairs) < 2:
@@ -91,7 +93,7 @@ def train(pairs: Sequence[Pair], options: TrainOptions, *, rng: np.random.Genera
     if options.features == "patch":
         pictures = [(pair.picture, pair.labels) for pair in small]
         trees = train_forest(pictures, len(classes), options.forest, options.pixels, rng=rng)
-        return Classifier("patch", classes, (trees,), options.height, options.forest.patch, about)
+        return Classifier("patch", classes, (trees,), height, height, options.forest.patch, about)
     examples = list(_examples(small, options, rng))
     seed = int(rng.integers(2**31))
 
@@ -100,7 +102,7 @@ def train(pairs: Sequence[Pair], options: TrainOptions, *, rng: np.random.Genera
         return train_boosted(codes, labels, weights, len(classes), options.boost, seed=seed)
 
     stages = train_stages(examples, fit, options.stages, options.pixels, rng=rng)
-    return Classifier("context", classes, stages, options.height, 0, about)
+    return Classifier("context", classes, stages, height, options.coarse, 0, about)
 
 
 def _working(pair: Pair, height: int) -> Pair:
@@ -115,9 +117,9 @@ def _examples(
 ) -> Iterator[Example]:
     for number, pair in enumerate(pairs):
         fold = number % min(options.inner, len(pairs))
-        yield Example(pair.picture, pair.labels, fold)
+        yield example(pair.picture, pair.labels, options.coarse, fold)
         for _ in range(options.augment):
-            yield Example(*varied(pair.picture, pair.labels, rng=rng), fold)
+            yield example(*varied(pair.picture, pair.labels, rng=rng), options.coarse, fold)
 
 
 def class_weights(labels: NDArray[np.intp], classes: int, balance: float) -> NDArray[np.float32]:

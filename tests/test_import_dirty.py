@@ -346,7 +346,7 @@ NAMES = sorted(assessor._named(assessor.AMES))
 
 def table(**values: str) -> list[list[str]]:
     usual = {"PID": "7", "1st Flr SF": "1000", "2nd Flr SF": "500", "Roof Style": "Hip"}
-    row = {name: "0" for name in NAMES} | usual | {"Garage Type": "Attchd"} | values
+    row = dict.fromkeys(NAMES, "0") | usual | {"Garage Type": "Attchd"} | values
     return [NAMES, [row[name] for name in NAMES]]
 
 

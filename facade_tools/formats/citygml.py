@@ -56,7 +56,7 @@ def records(stream: BinaryIO, options: ReadOptions) -> Iterator[Record]:
             for building in member.iterfind("Building"):
                 yield _model(building, system)
 
-    yield from models.records(read)
+    yield from models.records(read, options)
 
 
 def build(record: Record, options: ReadOptions) -> Built:

@@ -31,10 +31,10 @@ def records(stream: BinaryIO, options: ReadOptions) -> Iterator[Record]:
     start = without_mark(stream)
     if _is_sequence(stream):
         stream.seek(start)
-        yield from models.records(_Sequence(stream, start))
+        yield from models.records(_Sequence(stream, start), options)
         return
     stream.seek(start)
-    yield from models.records(_Document(stream, start))
+    yield from models.records(_Document(stream, start), options)
 
 
 def build(record: Record, options: ReadOptions) -> Built:

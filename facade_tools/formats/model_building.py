@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 import shapely
@@ -15,7 +15,7 @@ from ..artifacts.building import Box, BoxKind, Building, ElementKind, Frame
 from ..errors import InvalidInput
 from ..geometry.arrays import Floats
 from ..geometry.rectilinear import areas, main_direction, rotated
-from .model_masses import Mass, boxes_of, chimneys, footprint, masses
+from .model_masses import Dormer, Mass, boxes_of, footprint, masses, on_the_roof
 from .openings import Opening, opening_of, placed, side_of, storey_height
 from .reading import Front
 from .surfaces import Model, Surface, bounds, told
@@ -50,19 +50,12 @@ def building_of(
     facades only the sides with openings were observed.
     """
     notes: Counter[str] = Counter()
-    _refuse_implausible(model)
-    plan = footprint(model)
-    if plan.area < LEAST_HOUSE:
-        raise InvalidInput(f"a footprint of {plan.area:.2f} m²; expected at least {LEAST_HOUSE:g}")
-    rotation = _rotation(model, plan, front)
-    local, frame, whole = _framed(model, plan, rotation)
-    found, details = masses(local, 0.0, notes)
-    if not found:
-        raise InvalidInput("no roof higher than 1.6 m above its footprint; expected a building")
-    found += _neighbours(neighbours, frame, model.origin, whole, notes)
+    site = site_of(model, front, notes)
+    local, frame, whole, details = site.model, site.frame, site.plan, site.details
+    found = [*site.masses, *_neighbours(neighbours, frame, model.origin, whole, notes)]
     boxes, residual = boxes_of(found, notes)
     planes = [plane for mass in found if mass.kind == "general" for plane in mass.planes]
-    stacks = chimneys(local, planes, details, 0.0)
+    stacks, dormers = on_the_roof(local, planes, details, 0.0)
     openings = list(_openings(local, whole, notes))
     eaves = max(box.height or 0.0 for box in boxes if box.kind == "general")
     building = Building(
@@ -74,9 +67,33 @@ def building_of(
         partial=True,
         complete=("mass", "garage", "roof"),
         frame=frame,
-        tags=_tags(model, residual, len(details) - len(stacks), openings),
+        tags=_tags(model, residual, dormers, openings),
     )
     return replace(building, facades=placed(building, openings, notes)), notes
+
+
+@dataclass(frozen=True)
+class Site:
+    """A model in its own frame: its plan, what stands on it, and the small roofs above."""
+
+    model: Model
+    frame: Frame
+    plan: BaseGeometry
+    masses: list[Mass]
+    details: list[Mass]
+
+
+def site_of(model: Model, front: Front, notes: Counter[str]) -> Site:
+    """Return a model in its own frame; raises InvalidInput where it is no building."""
+    _refuse_implausible(model)
+    plan = footprint(model)
+    if plan.area < LEAST_HOUSE:
+        raise InvalidInput(f"a footprint of {plan.area:.2f} m²; expected at least {LEAST_HOUSE:g}")
+    local, frame, whole = _framed(model, plan, _rotation(model, plan, front))
+    found, details = masses(local, 0.0, notes)
+    if not found:
+        raise InvalidInput("no roof higher than 1.6 m above its footprint; expected a building")
+    return Site(local, frame, whole, found, details)
 
 
 def _refuse_implausible(model: Model) -> None:
@@ -243,13 +260,18 @@ def _storey(
 
 
 def _tags(
-    model: Model, residual: float, dormers: int, openings: Sequence[Opening]
+    model: Model, residual: float, dormers: Sequence[Dormer], openings: Sequence[Opening]
 ) -> dict[str, object]:
-    seen = {
-        "function": model.function,
-        "roof_types": sorted({code for code in model.roof_types if code}),
-        "dormers": max(dormers, 0),
+    seen: dict[str, object] = {
+        "dormers": [asdict(dormer) for dormer in dormers],
         "openings": len(openings),
     }
-    source = {name: value for name, value in seen.items() if value}
-    return {**source, "plan_residual": round(residual, 6)}
+    kept = {name: value for name, value in seen.items() if value}
+    return {**source_tags(model), **kept, "plan_residual": round(residual, 6)}
+
+
+def source_tags(model: Model) -> dict[str, object]:
+    """Return what a source says of a model: function and roof codes."""
+    codes = sorted({code for code in model.roof_types if code})
+    said = {"function": model.function, "roof_types": codes}
+    return {name: value for name, value in said.items() if value}

@@ -11,8 +11,9 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from ..artifacts.building import Box, BoxKind, Chimney, Roof
+from ..geometry.arrays import Floats
 from ..geometry.rectilinear import areas, partition
-from .surfaces import Model, Surface, bounds, told
+from .surfaces import Model, bounds, told
 from .surfaces_roofs import Plane, bodies, eaves_height, heights_at, roof_of, roof_plane
 
 DETAIL_AREA = 6.0  # m²: a roof body smaller than this, above another one, is a dormer
@@ -23,6 +24,9 @@ LOWEST = 1.6  # metres: lower masses are terraces and ramps
 CHIMNEY_SIDE = (0.2, 2.5)  # metres: least and largest width of a chimney
 CHIMNEY_AREA = 1.6  # m²: a larger one is a dormer
 CHIMNEY_RISE = 0.2  # metres above the highest roof around it
+DORMER_SIDE = (0.7, 12.0)  # metres: least and largest width of a dormer
+DORMER_RISE = 0.6  # metres above the roof at its lowest corner
+MOST = 100  # chimneys, and dormers, of one building
 
 
 @dataclass(frozen=True)
@@ -37,13 +41,14 @@ class Mass:
 
 
 @dataclass(frozen=True)
-class Boxes:
-    """Boxes of a building, the area error of their plan, and what was seen on the roof."""
+class Dormer:
+    """What rises out of a roof on one side: plan centre, plan size and height of its top (m)."""
 
-    boxes: tuple[Box, ...]
-    residual: float
-    dormers: int
-    chimneys: tuple[Chimney, ...]
+    x: float
+    y: float
+    width: float
+    depth: float
+    top: float
 
 
 def footprint(model: Model) -> BaseGeometry:
@@ -155,37 +160,63 @@ def _roof(mass: Mass, area: BaseGeometry, notes: Counter[str]) -> Roof:
     return Roof(whole.style, round(whole.pitch, 4), direction)
 
 
-def chimneys(
+def on_the_roof(
     model: Model, planes: Sequence[Plane], details: Sequence[Mass], ground: float
-) -> tuple[Chimney, ...]:
-    """Return installations and small roofs that rise out of the roof like a chimney."""
-    found = []
-    solids = [tuple(body) for body in model.outside]
-    solids += [tuple(p.surface for p in mass.planes) for mass in details if mass.plan.area < 4.0]
-    for surfaces in solids:
-        chimney = _chimney(surfaces, planes, ground)
+) -> tuple[tuple[Chimney, ...], tuple[Dormer, ...]]:
+    """Return what rises out of the roof: installations and small roofs above larger ones."""
+    stacks: list[Chimney] = []
+    dormers: list[Dormer] = []
+    bodies = [(tuple(body), False) for body in model.outside]
+    bodies += [(tuple(p.surface for p in mass.planes), True) for mass in details]
+    for surfaces, is_roof in bodies:
+        low, high = bounds(surfaces)
+        chimney = _chimney(low, high, planes, ground)
         if chimney is not None:
-            found.append(chimney)
-    return tuple(found[:100])
+            stacks.append(chimney)
+        elif _has_dormers_size(low, high) and (is_roof or _rises(low, high, planes)):
+            dormers.append(Dormer(*_plan(low, high), round(float(high[2]) - ground, 3)))
+    return tuple(stacks[:MOST]), tuple(dormers[:MOST])
 
 
-def _chimney(
-    surfaces: tuple[Surface, ...], planes: Sequence[Plane], ground: float
-) -> Chimney | None:
+def _plan(low: Floats, high: Floats) -> tuple[float, float, float, float]:
+    """Return centre and size of a bounding box in plan, to the millimetre."""
+    x, y = ((low + high)[:2] / 2.0).tolist()
+    width, depth = (high - low)[:2].tolist()
+    return round(x, 3), round(y, 3), round(width, 3), round(depth, 3)
+
+
+def _around(low: Floats, high: Floats, planes: Sequence[Plane]) -> Floats:
+    """Return the roof's height at the middle and the corners of a bounding box, NaN beside it."""
+    middle = ((low + high)[:2] / 2.0).tolist()
+    corners = [(a, b) for a in (low[0], high[0]) for b in (low[1], high[1])]
+    return heights_at(planes, np.array([middle, *corners]))
+
+
+def _has_dormers_size(low: Floats, high: Floats) -> bool:
+    width, depth = (high - low)[:2].tolist()
+    return bool(DORMER_SIDE[0] <= min(width, depth) <= max(width, depth) <= DORMER_SIDE[1])
+
+
+def _rises(low: Floats, high: Floats, planes: Sequence[Plane]) -> bool:
+    """Tell what stands above the roof on one side and goes through it on another."""
+    around = _around(low, high, planes)
+    if np.isnan(around[0]):
+        return False
+    lowest = float(np.nanmin(around))
+    return bool(high[2] > lowest + DORMER_RISE and low[2] > lowest - 2.0 * DORMER_RISE)
+
+
+def _chimney(low: Floats, high: Floats, planes: Sequence[Plane], ground: float) -> Chimney | None:
     """Return a thin upright body that rises out of the roof on all its sides.
 
     A dormer's top meets the roof on the uphill side, so it is none.
     """
-    low, high = bounds(surfaces)
-    width, depth = float(high[0] - low[0]), float(high[1] - low[1])
-    x, y = (float(value) for value in (low + high)[:2] / 2.0)
+    width, depth = (high - low)[:2].tolist()
     if not CHIMNEY_SIDE[0] <= min(width, depth) <= max(width, depth) <= CHIMNEY_SIDE[1]:
         return None
     if width * depth > CHIMNEY_AREA:
         return None
-    corners = [(a, b) for a in (low[0], high[0]) for b in (low[1], high[1])]
-    around = heights_at(planes, np.array([(x, y), *corners]))
+    around = _around(low, high, planes)
     if np.isnan(around[0]) or high[2] < np.nanmax(around) + CHIMNEY_RISE:
         return None
-    size = round(width, 3), round(depth, 3)
-    return Chimney(round(x, 3), round(y, 3), *size, round(float(high[2]) - ground, 3))
+    return Chimney(*_plan(low, high), round(float(high[2]) - ground, 3))

@@ -5,24 +5,25 @@ from __future__ import annotations
 from array import array
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ..artifacts.building import Building, Frame
+from ..artifacts.building import Building
 from ..artifacts.documents import decode
 from ..artifacts.footprint import Footprint
 from ..errors import InvalidInput
 from ..geometry.boxes import box_rectangles
 from ..geometry.rectilinear import valid_polygon
-from .model_building import ADJOINS, Neighbour, building_of
+from .model_building import ADJOINS, Neighbour, building_of, site_of, source_tags
 from .model_masses import footprint
 from .model_store import ModelStore, Numbers, PlanBoxes, plan_box
 from .outbuildings import Outbuildings, is_small, kind_of
 from .reading import Built, ReadOptions, Record
 from .surfaces import Model
+from .surfaces_roofs import roof_of
 
 SAME = 2e-3  # metres
 
@@ -46,13 +47,14 @@ class House:
     neighbours: tuple[Neighbour, ...] = ()
 
 
-def records(models: Models) -> Iterator[Record]:
+def records(models: Models, options: ReadOptions) -> Iterator[Record]:
     """Yield a record for every building; outbuildings go to the house that they adjoin.
 
     `models` reads the file from its start each time it is called: once to find the outbuildings,
-    which wait on disk, once to give them away.
+    which wait on disk, once to give them away. Footprints need no more than the second.
     """
-    outbuildings, numbers = _outbuildings(models)
+    alone = options.kind == "footprints"
+    outbuildings, numbers = (Outbuildings(), Numbers()) if alone else _outbuildings(models)
     number = -1
     line: Line | None = None
     for model in models():
@@ -118,7 +120,7 @@ def build(record: Record, options: ReadOptions) -> Built:
     if ours is not None and options.kind != "footprints":
         return Built((ours,), notes)
     if options.kind == "footprints":
-        return Built((footprint_of(house.model, options),))
+        return footprint_of(house.model, options)
     building, applied = building_of(house.model, house.neighbours, options.front)
     return Built((building,), notes + applied)
 
@@ -148,19 +150,22 @@ def _plan(artifact: Building | Footprint) -> BaseGeometry:
     return shapely.union_all([shapely.box(*row) for row in rectangles], grid_size=1e-4)
 
 
-def footprint_of(model: Model, options: ReadOptions) -> Footprint:
-    """Return the plan of a model in its own frame, with eaves and roof of its largest box."""
-    building = building_of(model, (), options.front)[0]
-    largest = max(building.boxes, key=lambda box: box.width * box.depth)
-    frame = building.frame or Frame(0.0, model.origin)
-    turn = np.radians(-frame.rotation)
-    c, s = np.cos(turn), np.sin(turn)
-    offset = np.array(model.origin[:2]) - np.array(frame.shift[:2])
-    polygon = max(shapely.get_parts(footprint(model)), key=lambda part: part.area)
+def footprint_of(model: Model, options: ReadOptions) -> Built:
+    """Return the plan of a model in its own frame, with eaves and roof of its largest mass."""
+    notes: Counter[str] = Counter()
+    site = site_of(model, options.front, notes)
+    parts = shapely.get_parts(site.plan)
+    if len(parts) > 1:
+        notes["plan in several pieces: its largest kept"] += 1
+    polygon = shapely.orient_polygons(max(parts, key=lambda part: part.area))
     rings = [
-        tuple(tuple(row) for row in ((points + offset) @ np.array([[c, s], [-s, c]])).tolist())
+        tuple(tuple(row) for row in np.round(points, 6).tolist())
         for ring in shapely.get_rings(polygon)
         if len(points := shapely.get_coordinates(ring)[:-1]) >= 3
     ]
-    height = largest.height or 0.0
-    return Footprint(model.id, tuple(rings), height, largest.roof, frame, dict(building.tags))
+    largest = max(site.masses, key=lambda mass: mass.plan.area)
+    roof = roof_of(largest.planes, largest.plan, largest.code, notes)
+    roof = replace(roof, pitch=round(roof.pitch, 4))
+    tags = source_tags(model)
+    found = Footprint(model.id, tuple(rings), largest.eaves, roof, site.frame, tags)
+    return Built((found,), notes)

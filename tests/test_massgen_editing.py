@@ -70,7 +70,7 @@ def test_suggestion_survives_a_model_that_has_nothing(monkeypatch, caplog):
     monkeypatch.setattr(mass_editing, "sample_attributes", draw)
     found = suggestion(WANTED, EDITED, shares(garage=1.0), None, rng=np.random.default_rng(0))
     assert found is None
-    assert "no such house" in caplog.text
+    assert "nothing that suits the edit" in caplog.text
 
 
 def test_nothing_is_built_before_an_observed_wall():
@@ -92,3 +92,24 @@ def test_complete_parts_are_not_added():
         WANTED, replace(EDITED, complete=("mass",)), rng=np.random.default_rng(0)
     )
     assert target.extra == 0
+
+
+def test_suggestion_holds_to_less_where_the_model_knows_no_such_building(monkeypatch):
+    asked = []
+
+    def draw(model, n, *, rng, given):
+        asked.append(given)
+        if len(asked) < 3:
+            raise Infeasible("no such building")
+        yield replace(building_attributes(Building("x", (MAIN, GARAGE))), id="0-0")
+
+    monkeypatch.setattr(mass_editing, "sample_attributes", draw)
+    rng = np.random.default_rng(0)
+    suited = suggestion(WANTED, EDITED, shares(garage=0.5), None, rng=rng)
+    assert suited.id == "wanted"
+    kept, free, same = asked
+    assert kept.mass.bcr == WANTED.mass.bcr
+    assert free.mass.bcr is None
+    assert free.element.roof["gable"] is None
+    assert free.bounds == kept.bounds
+    assert same.mass.bbox == (*free.bounds.bbox_min[:2], None)

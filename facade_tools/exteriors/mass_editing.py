@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from ..artifacts.attributes import Attributes, Bounds, Number, Present
 from ..artifacts.building import Building
 from ..artifacts.model import Model
 from ..errors import Infeasible
-from .attributes import attribute_vector, attributes_of_vector, building_attributes
+from .attributes import NAMES, attribute_vector, attributes_of_vector, building_attributes
 from .drawing import sample_attributes
 from .mass_attributes import GARAGE_AT
 from .mass_energy import GROUPS
@@ -80,16 +81,35 @@ def suggestion(
     """Return attributes near the wanted ones that suit the edit; None where there is nothing to do.
 
     shares: those of the best mass around the edit. Groups that it misses are drawn from the
-    model given all the others; None also where the model finds nothing that fits.
+    model given all the others. Where the model knows no such building, less and less of what was
+    wanted is held to (`_givens`); None also where nothing at all fits.
     """
     groups = contradicted(shares)
     if not groups:
         return None
-    given = loosened(attributes, keep, groups)
-    try:
-        (drawn,) = sample_attributes(model, 1, rng=rng, given=given)
-    except Infeasible as error:
-        log.warning("%s: the model has nothing that suits the edit: %s", attributes.id, error)
-        return None
-    log.info("%s: drawn anew from the model: %s", attributes.id, ", ".join(groups))
-    return replace(drawn, id=attributes.id)
+    for given, what in _givens(attributes, keep, groups):
+        try:
+            (drawn,) = sample_attributes(model, 1, rng=rng, given=given)
+        except Infeasible as error:
+            log.info("%s: %s: %s", attributes.id, what, error)
+            continue
+        log.info("%s: drawn anew from the model: %s", attributes.id, what)
+        return replace(drawn, id=attributes.id)
+    log.warning("%s: the model has nothing that suits the edit", attributes.id)
+    return None
+
+
+def _givens(
+    attributes: Attributes, keep: Building, groups: tuple[str, ...]
+) -> Iterator[tuple[Attributes, str]]:
+    """Yield what to hold to, and in words what is free, from most to least held to."""
+    yield loosened(attributes, keep, groups), ", ".join(groups)
+    mass = loosened(attributes, keep, tuple(GROUPS))
+    blank = np.full(len(NAMES), np.nan)
+    nothing = attributes_of_vector(attributes.id, blank, attributes.storey_height)
+    free = replace(mass, facade=nothing.facade, element=nothing.element)
+    yield free, "everything that the kept boxes do not show"
+    width, depth, _ = free.bounds.bbox_min if free.bounds else (0.0, 0.0, 0.0)
+    if min(width, depth) > 0.0:
+        same = replace(free, mass=replace(free.mass, bbox=(width, depth, None)))
+        yield same, "everything, on the plan's bounding box of the kept boxes"

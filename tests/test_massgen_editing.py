@@ -99,7 +99,7 @@ def test_suggestion_holds_to_less_where_the_model_knows_no_such_building(monkeyp
 
     def draw(model, n, *, rng, given):
         asked.append(given)
-        if len(asked) < 3:
+        if len(asked) < 4:
             raise Infeasible("no such building")
         yield replace(building_attributes(Building("x", (MAIN, GARAGE))), id="0-0")
 
@@ -107,9 +107,10 @@ def test_suggestion_holds_to_less_where_the_model_knows_no_such_building(monkeyp
     rng = np.random.default_rng(0)
     suited = suggestion(WANTED, EDITED, shares(garage=0.5), None, rng=rng)
     assert suited.id == "wanted"
-    kept, free, same = asked
+    kept, free, same, last = asked
     assert kept.mass.bcr == WANTED.mass.bcr
     assert free.mass.bcr is None
     assert free.element.roof["gable"] is None
     assert free.bounds == kept.bounds
     assert same.mass.bbox == (*free.bounds.bbox_min[:2], None)
+    assert last.mass.bbox == free.bounds.bbox_min

@@ -109,7 +109,8 @@ def _givens(
     nothing = attributes_of_vector(attributes.id, blank, attributes.storey_height)
     free = replace(mass, facade=nothing.facade, element=nothing.element)
     yield free, "everything that the kept boxes do not show"
-    width, depth, _ = free.bounds.bbox_min if free.bounds else (0.0, 0.0, 0.0)
+    width, depth, height = free.bounds.bbox_min if free.bounds else (0.0, 0.0, 0.0)
     if min(width, depth) > 0.0:
-        same = replace(free, mass=replace(free.mass, bbox=(width, depth, None)))
-        yield same, "everything, on the plan's bounding box of the kept boxes"
+        for top in (None, height):
+            same = replace(free, mass=replace(free.mass, bbox=(width, depth, top)))
+            yield same, "everything, in the bounding box of the kept boxes"

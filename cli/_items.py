@@ -7,7 +7,7 @@ from contextlib import closing
 from importlib import import_module
 from typing import Any, TypeVar
 
-from facade_tools.artifacts.store import RawItem, read_raw
+from facade_tools.artifacts.store import read_raw
 from facade_tools.errors import FacadeError, InvalidInput
 from facade_tools.parallel import map_ordered
 
@@ -26,9 +26,9 @@ def load(target: str) -> Callable[..., Any]:
 
 def each(
     name: str,
-    function: Callable[[RawItem], R],
+    function: Callable[[Any], R],
     stream: StreamOptions,
-    items: Iterable[RawItem] | None = None,
+    items: Iterable[Any] | None = None,
 ) -> Iterator[R]:
     """Yield `function` of every item, in order, with progress and --on-error as asked for.
 

@@ -34,14 +34,15 @@ class Plot:
 def plots(path: str, metres: bool = False) -> Iterator[Plot]:
     """Yield the plots of a file. Raises InvalidInput where it holds none."""
     found = False
-    for artifact in _artifacts(path, metres):
+    for artifact in artifacts_of(path, metres):
         found = True
         yield _of_building(artifact) if isinstance(artifact, Building) else _of_footprint(artifact)
     if not found:
         raise InvalidInput("holds no polygon of a building").at(path)
 
 
-def _artifacts(path: str, metres: bool) -> Iterator[Footprint | Building]:
+def artifacts_of(path: str, metres: bool) -> Iterator[Footprint | Building]:
+    """Yield the footprints and buildings of a file, GeoJSON or artifacts."""
     if Path(path).suffix.lower() in GEOJSON or _is_geojson(path):
         options = ReadOptions(kind="footprints", metres=metres)
         for item in items([path], options):

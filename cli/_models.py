@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,66 +26,83 @@ DATA = (".json", ".jsonl")
 
 @dataclass(frozen=True)
 class Made:
-    """One result: the building, and functions that make its scene and its tree when asked."""
+    """One result: its id, and those of building, scene and tree that are wanted."""
 
-    building: Any
-    scene: Callable[[], Scene]
-    tree: Callable[[], Any]
+    id: str
+    building: Any = None
+    scene: Scene | None = None
+    tree: Any = None
     frame: Frame | None = None
 
 
+@dataclass(frozen=True)
+class Wanted:
+    """What the output's name asks for: a `building`, a `scene`; and the `tree` beside it."""
+
+    building: bool
+    scene: bool
+    tree: bool
+
+
+def wanted(output: str | None, tree: str | None) -> Wanted:
+    """Return what is to be made; raises UsageError for an ending that means nothing."""
+    ending = "" if output is None else Path(output).suffix.lower()
+    data = output is None or output == "-" or ending in DATA
+    if not data and ending not in MODELS and not is_folder(output or ""):
+        known = ", ".join((*MODELS, *DATA))
+        raise click.UsageError(f"{output}: unknown ending; expected {known} or a folder")
+    return Wanted(data, not data, tree is not None)
+
+
 def write_models(results: Iterable[Made], output: str | None, tree: str | None) -> None:
-    """Write results where the options say; an error before leaves no file behind."""
-    rows = _checked(list(results))
-    writer = _writer(output)
-    if tree is not None:
-        with open_sink(tree) as write:
-            for row in rows:
-                _write_artifact(write, row.tree(), tree)
-    writer(rows, output)
-
-
-def _checked(rows: list[Made]) -> list[Made]:
+    """Write results as they come where the options say; a single model waits for all."""
     seen: set[str] = set()
-    for row in rows:
-        if row.building.id in seen:
-            raise InvalidInput(f"id {row.building.id!r} stands twice; expected unique ids")
-        seen.add(row.building.id)
-    return rows
+    with _opened(output) as write, _trees(tree) as write_tree:
+        for made in results:
+            if made.id in seen:
+                raise InvalidInput(f"id {made.id!r} stands twice; expected unique ids")
+            seen.add(made.id)
+            write_tree(made)
+            write(made)
 
 
-def _writer(output: str | None) -> Callable[[list[Made], Any], None]:
-    if output is None or output == "-" or Path(output).suffix.lower() in DATA:
-        return _artifacts
-    if is_folder(output):
-        return _folder
-    if Path(output).suffix.lower() in MODELS:
-        return _model
-    known = ", ".join((*MODELS, *DATA))
-    raise click.UsageError(f"{output}: unknown ending; expected {known} or a folder")
+@contextmanager
+def _trees(tree: str | None) -> Iterator[Callable[[Made], None]]:
+    if tree is None:
+        yield lambda made: None
+        return
+    with open_sink(tree) as write:
+        yield lambda made: write(made.id, _bytes(made.tree, tree))
 
 
-def _artifacts(rows: list[Made], output: str | None) -> None:
-    with open_sink(output) as write:
-        for row in rows:
-            _write_artifact(write, row.building, output)
+@contextmanager
+def _opened(output: str | None) -> Iterator[Callable[[Made], None]]:
+    """Open what takes the results themselves."""
+    if wanted(output, None).building:
+        with open_sink(output) as write:
+            yield lambda made: write(made.id, _bytes(made.building, output))
+    elif output is not None and not is_folder(output):
+        kept: list[Made] = []
+        yield kept.append
+        _model(kept, Path(output))
+    else:
+        yield lambda made: _alone(made, Path(output or ""))
 
 
-def _write_artifact(write: Any, artifact: Any, output: str | None) -> None:
+def _bytes(artifact: Any, output: str | None) -> bytes:
+    lines = output is None or output == "-" or output.lower().endswith(".jsonl")
     document = encode(artifact)
-    lines = output is None or Path(output).suffix.lower() == ".jsonl" or output == "-"
-    write(artifact.id, dump_line(document) if lines else dump_document(document))
+    return dump_line(document) if lines else dump_document(document)
 
 
-def _folder(rows: list[Made], output: str) -> None:
-    for row in rows:
-        _write(Path(output), model_files([row.scene()], file_name(row.building.id), "glb"))
+def _alone(made: Made, folder: Path) -> None:
+    assert made.scene is not None
+    _write(folder, model_files([made.scene], file_name(made.id), "glb"))
 
 
-def _model(rows: list[Made], output: str) -> None:
-    path = Path(output)
+def _model(rows: list[Made], path: Path) -> None:
     form = path.suffix.lower().removeprefix(".")
-    scenes = placed([row.scene() for row in rows], "auto", [row.frame for row in rows])
+    scenes = placed([row.scene for row in rows if row.scene], "auto", [row.frame for row in rows])
     files = model_files(scenes, file_name(path.stem), form)
     main = f"{file_name(path.stem)}.{form}"
     _write(path.parent, {path.name if name == main else name: d for name, d in files.items()})

@@ -242,8 +242,8 @@ def _caps(shape: Shape) -> Iterator[Shape]:
 def roof(shape: Shape, operation: Operation, measure: Measure) -> tuple[Roof, list[Shape]]:
     """Return the roof over the top of a shape, and the faces that `into` names.
 
-    Selectors: a side, then lower, upper, gable, then all. Raises InvalidInput where the shape does
-    not lie level.
+    Selectors: lower, upper or gable, then the side, then all. Raises InvalidInput where the shape
+    does not lie level.
     """
     if shape.plane == "y" or abs(shape.scope.axes[2] @ UP) < 1.0 - 1e-9:
         raise InvalidInput("a roof needs a level outline")
@@ -259,7 +259,7 @@ def roof(shape: Shape, operation: Operation, measure: Measure) -> tuple[Roof, li
     base = shape.scope.moved(np.array([0.0, 0.0, shape.scope.size[2]]), np.zeros(3))
     faces = []
     for number, face in enumerate(made.faces):
-        named = [key for key in (face.side, face.kind, "all") if key in into]
+        named = [key for key in (face.kind, face.side, "all") if key in into]
         if named:
             placed = _roof_face(base, face)
             faces.append(

@@ -1,0 +1,122 @@
+"""The body of `facade reconstruct`."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+from facade_tools.artifacts.parse import Parse
+from facade_tools.artifacts.provenance import Provenance, Source
+from facade_tools.artifacts.store import RawItem, read_raw
+from facade_tools.errors import FacadeError, InvalidInput
+from facade_tools.imaging.image_io import Photo, read_photo
+from facade_tools.randomness import item_generator
+from facade_tools.reconstruction.engine import Lot
+from facade_tools.reconstruction.reconstruct import Ask, reconstruct
+
+from ._items import each
+from ._lots import Plot, plots
+from ._models import Made, Wanted, wanted, write_models
+from ._options import StreamOptions
+from ._stream import side_input
+
+NAME = "reconstruct"
+
+log = logging.getLogger("facade_tools.reconstruct")
+
+
+@dataclass(frozen=True)
+class Task:
+    """A parse and the ground that it stands on."""
+
+    item: RawItem
+    plot: Plot | None
+
+
+@dataclass(frozen=True)
+class Maker:
+    """Reconstructs one parse in any process."""
+
+    ask: Ask
+    image: str | None
+    seed: int
+    recorded: Mapping[str, Any]
+    sources: tuple[Source, ...]
+    wanted: Wanted
+
+    def __call__(self, task: Task) -> Made:
+        """Return what is wanted of one parse; raises InvalidInput with its place."""
+        item = task.item
+        parse: Parse = item.artifact("parse")
+        photo = self._photo(item, parse)
+        plot = task.plot
+        lots = [] if plot is None else [Lot(rings, height) for rings, height in plot.lots]
+        rng = item_generator(self.seed, NAME, parse.id)
+        ask = self.ask
+        if plot is not None and plot.roof is not None and ask.roof == "auto":
+            ask = replace(ask, roof=_known(plot.roof.style))
+        try:
+            made = reconstruct(parse, photo.pixels, lots, ask, rng=rng)
+            inputs = (item.provenance(), Source(photo.name, photo.sha256), *self.sources)
+            provenance = Provenance(NAME, self.seed, self.recorded, inputs)
+            frame = None if plot is None else plot.frame
+            more: dict[str, Any] = {"frame": frame, "provenance": provenance}
+            return Made(
+                parse.id,
+                replace(made.building(), **more) if self.wanted.building else None,
+                made.scene() if self.wanted.scene else None,
+                replace(made.tree(), **more) if self.wanted.tree else None,
+                frame,
+            )
+        except InvalidInput as error:
+            raise error.at(item.source, item.line) from None
+        except FacadeError as error:
+            raise type(error)(f"{item.source}: {parse.id}: {error}") from None
+
+    def _photo(self, item: RawItem, parse: Parse) -> Photo:
+        """Return the picture of a parse, from --image or from beside the parse."""
+        name = Path(parse.image.name).name
+        beside = Path() if item.source == "-" else Path(item.source).parent
+        path = beside / name if self.image is None else Path(self.image)
+        if path.is_dir():
+            path /= name
+        if not path.is_file():
+            message = f"its picture {str(path)!r} is not there; name it with --image"
+            raise InvalidInput(message, pointer="/image/name").at(item.source, item.line)
+        photo = read_photo(str(path))
+        if photo.sha256 != parse.image.sha256:
+            log.warning("%s: %s is not the file that was parsed", parse.id, path.name)
+        return photo
+
+
+def _known(style: str) -> str:
+    return style if style in ("flat", "gable", "hip", "mansard") else "hip"
+
+
+def run_reconstruct(stream: StreamOptions, values: Mapping[str, Any]) -> None:
+    """Reconstruct all parses and write them."""
+    footprint, tree = values["footprint"], values["tree"]
+    ask = Ask(
+        values["storey_height"], values["height"], values["depth"], values["roof"],
+        frozenset(values["party"]),
+    )  # fmt: skip
+    recorded = {
+        name: values[name] for name in ("storey_height", "height", "depth", "roof", "metres")
+    }
+    recorded["party"] = sorted(values["party"])
+    sources = side_input(footprint)
+    maker = Maker(
+        ask, values["image"], stream.seed or 0, recorded, sources, wanted(stream.output, tree)
+    )
+    grounds = None if footprint is None else list(plots(footprint, values["metres"]))
+    tasks = _tasks(stream, grounds)
+    write_models(each(NAME, maker, stream, tasks), stream.output, tree)
+
+
+def _tasks(stream: StreamOptions, grounds: list[Plot] | None) -> Iterator[Any]:
+    for number, item in zip(count(), read_raw(stream.inputs), strict=False):
+        yield Task(item, None if grounds is None else grounds[number % len(grounds)])

@@ -1,0 +1,164 @@
+"""A parse and a footprint become a textured building (KSTTP09 section 4, Fig. 1)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from ..artifacts.building import Building, Colors
+from ..artifacts.derivation import Derivation
+from ..artifacts.parse import Parse
+from ..errors import InvalidInput
+from ..geometry.arrays import Floats, Points2, Points3
+from ..geometry.mesh import Scene
+from ..imaging.image_io import Picture
+from .boxed import derived_building
+from .drawing import Look, Painted, derived_scene
+from .elevation import Elevation, elevation, label_map, stretched
+from .engine import Derived, Leaf, Lot, derive
+from .records import derivation_of
+from .specific import Cover, Design, Specific, specific_grammar
+from .surfaces import TILE_METRES, Surfaces, canvas_of, surfaces_of
+
+DEPTH = 12.0  # metres, of the default footprint
+
+
+@dataclass(frozen=True, slots=True)
+class Ask:
+    """What the user says beside the parse.
+
+    storey_height, height: metres (see elevation). depth: of the default footprint, metres. roof:
+    flat, gable, hip, mansard or auto. party: sides that are blind walls.
+    """
+
+    storey_height: float | None = None
+    height: float | None = None
+    depth: float = DEPTH
+    roof: str = "auto"
+    party: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True, slots=True)
+class Reconstruction:
+    """The elevation, the specific grammar, what it derives, and its textures."""
+
+    name: str
+    plan: Elevation
+    specific: Specific
+    derived: Derived
+    surfaces: Surfaces
+
+    def scene(self) -> Scene:
+        """Return the textured scene; `mass` is its closed solid."""
+        look = Look(_Painter(self.specific), self.surfaces.materials)
+        return derived_scene(self.derived, self.name, look)
+
+    def building(self) -> Building:
+        """Return the parametric building; what the front shows is known."""
+        made = derived_building(self.derived, self.name, self.plan.storey, ["front"])
+        colors = self.surfaces.colors
+        own = Colors(colors["wall"], "#efeae0", colors["roof"], colors["door"])
+        return replace(made, colors=own)
+
+    def tree(self) -> Derivation:
+        """Return the derivation."""
+        return derivation_of(self.derived, self.specific.grammar, self.name)
+
+
+def reconstruct(
+    parse: Parse,
+    photo: Picture,
+    lots: Sequence[Lot] = (),
+    ask: Ask | None = None,
+    *,
+    rng: np.random.Generator,
+) -> Reconstruction:
+    """Return the building of a parse on a footprint, by default a rectangle behind the facade.
+
+    photo: the picture that was parsed, (h, w, 3). lots: outlines whose widest side to the front
+    (−y) is the parsed facade; a lot's height, where not 0, is that of its eaves. Raises
+    InvalidInput where the parse shows no building or the picture is another.
+    """
+    ask = ask or Ask()
+    labels = label_map(parse)
+    picture = _rectified(photo, parse, labels.shape)
+    plan = elevation(parse, ask.storey_height, ask.height)
+    if lots:
+        width, top = _front(lots)
+        plan = stretched(plan, width, top)
+    else:
+        lots = [_rectangle(plan.width, ask.depth)]
+    surfaces = surfaces_of(canvas_of(picture, labels, plan), plan, rng=rng)
+    design = Design(_roof(plan, ask.roof), surfaces.axes, ask.party, surfaces.colors)
+    specific = specific_grammar(plan, design, parse.id)
+    derived = derive(specific.grammar, lots, rng=rng)
+    return Reconstruction(parse.id, plan, specific, derived, surfaces)
+
+
+def _rectified(photo: Picture, parse: Parse, shape: tuple[int, ...]) -> Picture:
+    """Return the photograph in the pixels of the parse's regions."""
+    turn = np.array(parse.rectification, float)
+    if not np.allclose(turn, np.eye(3)):
+        size = (shape[1], shape[0])
+        return np.asarray(cv2.warpPerspective(photo, turn, size), dtype=np.uint8)
+    if photo.shape[:2] != tuple(shape):
+        found, wanted = (f"{s[1]}×{s[0]}" for s in (photo.shape, shape))
+        raise InvalidInput(f"the picture has {found} pixels; the parse is of {wanted}")
+    return photo
+
+
+def _rectangle(width: float, depth: float) -> Lot:
+    w, d = width / 2, depth / 2
+    return Lot([np.array([[-w, -d], [w, -d], [w, d], [-w, d]])])
+
+
+def _front(lots: Iterable[Lot]) -> tuple[float, float | None]:
+    """Return width and eaves of the widest wall that looks to the front, or of the widest."""
+    rows = []
+    for lot in lots:
+        for ring in lot.rings:
+            steps = np.roll(ring, -1, axis=0) - ring
+            lengths = np.hypot(*steps.T)
+            front = (np.abs(steps[:, 1]) <= np.abs(steps[:, 0]) + 1e-9) & (steps[:, 0] > 0)
+            rows += [
+                (bool(f), float(length), lot.height or None)
+                for f, length in zip(front, lengths, strict=True)
+            ]
+    _, width, height = max(rows, key=lambda row: row[:2])
+    return width, height
+
+
+def _roof(plan: Elevation, asked: str) -> str:
+    """Return the roof's style: what is asked for, or what the picture suggests."""
+    if asked != "auto":
+        return asked
+    if plan.loft <= 0:
+        return "flat"
+    return "mansard" if plan.dormers or plan.loft > 1.6 else "hip"
+
+
+@dataclass(frozen=True, slots=True)
+class _Painter:
+    """Finds material and texture coordinates of a leaf's points."""
+
+    specific: Specific
+
+    def __call__(self, leaf: Leaf, points: Points3, normal: Floats) -> Painted | None:
+        cover = self.specific.covers.get(leaf.shape.symbol)
+        if cover is None:
+            return None
+        return cover.texture, _coordinates(leaf, points, cover)
+
+
+def _coordinates(leaf: Leaf, points: Points3, cover: Cover) -> Points2:
+    """Return the texture coordinates (n, 2) of points on a leaf."""
+    scope = leaf.shape.scope
+    local = ((points - scope.origin) @ scope.axes.T)[:, [0, 2]]
+    if cover.rect is None:
+        return np.asarray(local / TILE_METRES)
+    u0, v0, u1, v1 = cover.rect
+    share = local / np.maximum(scope.size[[0, 2]], 1e-9)
+    return np.asarray(np.array([u0, v0]) + share * np.array([u1 - u0, v1 - v0]))

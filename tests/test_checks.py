@@ -8,7 +8,16 @@ from pathlib import Path
 
 import pytest
 
-from facade_tools.artifacts.building import Box, Building, Element, Facade, Piece, Roof, Side
+from facade_tools.artifacts.building import (
+    Box,
+    Building,
+    Element,
+    Energy,
+    Facade,
+    Piece,
+    Roof,
+    Side,
+)
 from facade_tools.artifacts.store import read
 from facade_tools.geometry.blocked import blocked_rectangles, porch_posts, roof_height
 from facade_tools.geometry.checks import Problem, building_problems
@@ -110,6 +119,14 @@ FAULTS: dict[str, tuple[Callable[[Building], Building], str, str]] = {
         lambda b: with_front(b, lambda p: replace(p, elements=(DOOR, replace(DOOR, u=6.0)))),
         "/facades",
         "2 main doors",
+    ),
+    "heads of two heights": (
+        lambda b: with_front(
+            replace(b, energy=Energy(facade=0.0)),
+            lambda p: replace(p, elements=(DOOR, WINDOW, replace(WINDOW, u=6.0, height=1.2))),
+        ),
+        "/facades/front/pieces/0/elements/2",
+        "head is 0.20 m below",
     ),
     "hanging door": (
         lambda b: with_front(b, lambda p: replace(p, elements=(replace(DOOR, v=0.6),))),

@@ -28,7 +28,7 @@ def designed_pieces(
     """Return by piece id the elements of designed walls.
 
     A design is solved for the largest plane of general boxes of its side, all storeys together.
-    Elements that would cross a storey line, leave the wall or meet a roof are left out with a
+    They count as known: a design is the user's word. Elements that would cross a storey line, leave the wall or meet a roof are left out with a
     warning. Raises Infeasible where a design has no layout of that size.
     """
     kinds = {box.id: box.kind for box in building.boxes}
@@ -72,7 +72,7 @@ def _inside(elements: Sequence[Element], at: tuple[float, float], piece: Piece) 
     """Return the elements that lie in a piece, in its frame."""
     moved = [replace(e, u=e.u - at[0], v=e.v - at[1]) for e in elements]
     return [
-        replace(e, u=max(e.u, 0.0), v=max(e.v, 0.0))
+        replace(e, u=max(e.u, 0.0), v=max(e.v, 0.0), known=True)
         for e in moved
         if min(e.u, e.v) >= -NEAR
         and e.u + e.width <= piece.width + NEAR

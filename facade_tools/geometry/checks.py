@@ -21,6 +21,8 @@ from .pieces import facade_pieces
 
 NEAR = 1e-4  # what is closer than this is in the same place (m)
 STEP = 0.3  # highest threshold of a door above its storey's floor (m)
+HEADS = 0.01  # greatest difference of a storey's window heads in a generated facade (m)
+LINTEL = 0.16  # wall over a window that lower eaves leave (m)
 HIGHEST_SILL = 2.2  # above the storey's floor (m)
 GARAGE_WALL = (2.8, 2.3)  # least width and height of a wall that must take a garage door (m)
 POINT = {kind: kind.replace("-", " ") for kind in ("window", "door", "garage-door")}
@@ -54,6 +56,8 @@ def building_problems(building: Building) -> Iterator[Problem]:
         yield from _piece_problems(building)
     placed = list(_placed(building))
     yield from _placing_problems(building, placed)
+    if building.energy is not None and building.energy.facade is not None:
+        yield from _head_problems(building, placed)
     if not building.partial:
         yield from _door_problems(building, placed)
 
@@ -204,6 +208,23 @@ def _height_problems(items: list[_Placed], storey: float) -> Iterator[Problem]:
             yield Problem(item.pointer, f"the sill is {height:.2f} m above the storey's floor")
         if e.kind != "window" and height > STEP:
             yield Problem(item.pointer, f"the {POINT[e.kind]} hangs {height:.2f} m above the floor")
+
+
+def _head_problems(building: Building, placed: list[_Placed]) -> Iterator[Problem]:
+    """Compare the heads of generated windows with their storey's: only low eaves excuse."""
+    fresh = [i for i in placed if i.element.kind == "window" and not i.element.known]
+    levels = [np.floor(i.piece.origin[2] / building.storey_height + NEAR) for i in fresh]
+    heads = [i.piece.origin[2] + i.element.v + i.element.height for i in fresh]
+    usual = {
+        level: max(head for head, own in zip(heads, levels, strict=True) if own == level)
+        for level in set(levels)
+    }
+    for item, level, head in zip(fresh, levels, heads, strict=True):
+        short = usual[level] - head
+        room = item.piece.origin[2] + item.piece.height - head
+        if short > HEADS and room > LINTEL:
+            message = f"the window's head is {short:.2f} m below those of its storey"
+            yield Problem(item.pointer, message)
 
 
 def _door_problems(building: Building, placed: list[_Placed]) -> Iterator[Problem]:

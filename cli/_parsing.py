@@ -18,13 +18,16 @@ from facade_tools.artifacts.writing import write_bytes
 from facade_tools.errors import FacadeError, InvalidInput
 from facade_tools.formats.png import write as write_png
 from facade_tools.grammar.reading import Method, Reading, ReadOptions
+from facade_tools.imaging.homography import warped
 from facade_tools.imaging.image_io import PICTURES, Photo, read_labels, read_photo
 from facade_tools.imaging.label_views import overlay
+from facade_tools.imaging.rectify import Rectification
 from facade_tools.parallel import map_ordered
 from facade_tools.randomness import item_generator
 
 from ._items import load
 from ._options import StreamOptions
+from ._rectifying import rectification_of
 from ._report import Progress, say_error
 from ._stream import file_name, is_folder, open_sink, side_input
 from .parse_image import METHODS
@@ -46,6 +49,7 @@ class ParseOptions:
     overlay: str | None
     height: float | None = None
     storey_height: float | None = None
+    rectify: str | None = None
 
     @property
     def recorded(self) -> dict[str, str | float | None]:
@@ -57,6 +61,7 @@ class ParseOptions:
             "grammar": self.grammar and Path(self.grammar).name,
             "classifier": self.classifier and Path(self.classifier).name,
             **{name: value for name, value in metres.items() if value is not None},
+            **({"rectify": Path(self.rectify).name} if self.rectify else {}),
         }  # fmt: skip
 
 
@@ -83,16 +88,24 @@ class Read:
         photo = read_photo(path)
         identity = Path(path).stem
         rng = item_generator(self.seed, NAME, identity)
+        mask = _mask(self.options.mask)
         try:
+            turned = None
+            if self.options.rectify is not None:
+                turned = rectification_of(photo, self.options.rectify)
+                photo, mask = _straight(photo, mask, turned)
             method = _method(self.options.method, _read_options(self.options))
-            reading = method(photo, identity, rng=rng, mask=_mask(self.options.mask))
+            reading = method(photo, identity, rng=rng, mask=mask)
         except InvalidInput as error:
             raise error.at(path) from None
         except FacadeError as error:
             raise type(error)(f"{path}: {error}") from None
         inputs = (Source(photo.name, photo.sha256), *self.sources)
         provenance = Provenance(NAME, self.seed, self.options.recorded, inputs)
-        document = encode(replace(reading.parse, provenance=provenance))
+        parse = replace(reading.parse, provenance=provenance)
+        if turned is not None:
+            parse = replace(parse, rectification=turned.rows)
+        document = encode(parse)
         data = dump_document(document) if self.indented else dump_line(document)
         return Result(identity, data, dict(self._pictures(photo, reading)))
 
@@ -122,6 +135,18 @@ def _mask(path: str | None) -> NDArray[np.bool_] | None:
     return None if path is None else read_labels(path) > 0
 
 
+def _straight(
+    photo: Photo, mask: NDArray[np.bool_] | None, turned: Rectification
+) -> tuple[Photo, NDArray[np.bool_] | None]:
+    """Return the photograph and its mask as they look from the front."""
+    straight = replace(photo, pixels=turned.picture(photo.pixels))
+    if mask is None:
+        return straight, None
+    if mask.shape != photo.pixels.shape[:2]:
+        raise InvalidInput("the mask has another size than the picture")
+    return straight, warped(mask.astype(np.uint8), turned.homography, turned.size) > 0
+
+
 def run_parse(stream: StreamOptions, options: ParseOptions) -> None:
     """Read all pictures; write parses to the output and pictures beside."""
     method = _method(options.method, _read_options(options))  # its errors come before any picture
@@ -130,6 +155,7 @@ def run_parse(stream: StreamOptions, options: ParseOptions) -> None:
         *side_input(options.classifier),
         *_grammar_source(options),
         *side_input(options.mask),
+        *_report_source(options),
     )
     single = stream.output is not None and stream.output.lower().endswith(".json")
     read = Read(options, stream.seed or 0, sources, single)
@@ -158,6 +184,11 @@ def run_parse(stream: StreamOptions, options: ParseOptions) -> None:
 def _grammar_source(options: ParseOptions) -> tuple[Source, ...]:
     named = options.grammar
     return side_input(named) if named is not None and Path(named).is_file() else ()
+
+
+def _report_source(options: ParseOptions) -> tuple[Source, ...]:
+    named = options.rectify
+    return side_input(named) if named is not None and named.lower().endswith(".json") else ()
 
 
 def _paths(inputs: tuple[str, ...]) -> Iterator[str]:

@@ -11,11 +11,12 @@ import click
 import numpy as np
 
 from facade_tools.artifacts.numbers import dump_document
+from facade_tools.artifacts.store import read_raw
 from facade_tools.artifacts.writing import write_bytes
 from facade_tools.errors import InvalidInput
 from facade_tools.imaging.homography import Points
-from facade_tools.imaging.image_io import encoded, read_photo
-from facade_tools.imaging.rectify import automatic, from_corners
+from facade_tools.imaging.image_io import Photo, encoded, read_photo
+from facade_tools.imaging.rectify import Rectification, automatic, from_corners, from_report
 
 LOG = logging.getLogger("facade_tools.rectify")
 
@@ -27,8 +28,7 @@ def run_rectify(image: str, output: str | None, corners: str, report: str | None
     given = None if corners == "auto" else _corners(corners)
     photo = read_photo(image)
     try:
-        shape = photo.pixels.shape
-        found = automatic(photo.pixels) if given is None else from_corners(shape, given)
+        found = _found(photo, given)
     except InvalidInput as error:
         raise error.at(image) from None
     LOG.info("%s: confidence %.2f", image, found.confidence)
@@ -47,6 +47,35 @@ def run_rectify(image: str, output: str | None, corners: str, report: str | None
             "size": list(found.size), "image": {"name": photo.name, "sha256": photo.sha256},
         }  # fmt: skip
         write_bytes(Path(report), dump_document(document))
+
+
+def _found(photo: Photo, corners: Points | None) -> Rectification:
+    if corners is None:
+        return automatic(photo.pixels)
+    return from_corners(photo.pixels.shape, corners)
+
+
+def rectification_of(photo: Photo, asked: str) -> Rectification:
+    """Return the rectification that `--rectify` asks for: auto, four corners, or a report."""
+    if asked == "auto":
+        return automatic(photo.pixels)
+    if Path(asked).suffix.lower() == ".json":
+        return _reported(photo, asked)
+    return from_corners(photo.pixels.shape, _corners(asked))
+
+
+def _reported(photo: Photo, path: str) -> Rectification:
+    """Return the rectification of a report that `facade rectify` has written about this picture."""
+    try:
+        report = next(read_raw([path])).document()
+        found = from_report(report["homography"], report["size"], report["confidence"])
+        digest = report["image"]["sha256"]
+    except (KeyError, TypeError, ValueError, StopIteration):
+        message = "is no report of `facade rectify`: homography, size, confidence, image"
+        raise InvalidInput(message).at(path) from None
+    if digest != photo.sha256:
+        raise InvalidInput(f"is the report of another picture than {photo.name}").at(path)
+    return found
 
 
 def _corners(text: str) -> Points:

@@ -41,6 +41,12 @@ METHODS = {
     "--storey-height", type=click.FloatRange(1, 20), metavar="M",
     help="mrf: height of a storey, metres.  [default: unknown; taken to be 3]",
 )  # fmt: skip
+@click.option(
+    "--rectify", metavar="auto|X,Y X,Y X,Y X,Y|REPORT",
+    help="Straighten the photograph first: from its own lines, from four corners (pixels, as in "
+    "`facade rectify`), or by the report.json that `facade rectify` wrote.  "
+    "[default: it is straight]",
+)  # fmt: skip
 @click.option("--mask", metavar="PNG", help="Not 0 where something hides the facade.")
 @click.option("--labels", metavar="PNG", help="Label map of the regions; a folder for many.")
 @click.option("--raw-labels", metavar="PNG", help="Label map of the classifier alone.")
@@ -48,8 +54,9 @@ METHODS = {
 def command(stream: StreamOptions, **values: Any) -> None:
     """Read rectified photographs of facades: floors, columns, windows, balconies, doors, roofs.
 
-    IMAGE is a picture (JPEG, PNG, TIFF, BMP, WebP) or a folder of them. Use `facade rectify`
-    first where the facade was taken at an angle.
+    IMAGE is a picture (JPEG, PNG, TIFF, BMP, WebP) or a folder of them. Where the facade was
+    taken at an angle, --rectify straightens it; regions are then in pixels of the straight
+    picture, and the parse holds the homography.
 
     \b
     Example: facade parse-image sample_data/photos -o parses.jsonl --overlay overlays/

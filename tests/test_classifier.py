@@ -38,7 +38,7 @@ def pairs():
 
 @pytest.fixture(scope="module")
 def trained(pairs):
-    options = TrainOptions(stages=2, height=160, coarse=96, pixels=1500, boost=SMALL)
+    options = TrainOptions(stages=2, height=160, coarse=96, pixels=1500, early=SMALL, boost=SMALL)
     return train(pairs, options, rng=np.random.default_rng(0))
 
 
@@ -102,7 +102,7 @@ def test_exported_trees_predict_what_lightgbm_does():
         "objective": "multiclass", "num_class": 3, "num_leaves": 8, "max_depth": 5,
         "learning_rate": SMALL.rate, "min_data_in_leaf": 5, "feature_fraction": SMALL.share,
         "lambda_l2": 2.0, "max_bin": 63, "num_threads": 1, "verbosity": -1, "seed": 1,
-        "deterministic": True, "force_row_wise": True,
+        "deterministic": True, "force_col_wise": True, "bin_construct_sample_cnt": 10_000,
     }  # fmt: skip
     data = lightgbm.Dataset(codes, labels, weight=np.ones(600))
     raw = lightgbm.train(settings, data, SMALL.rounds).predict(codes, raw_score=True)

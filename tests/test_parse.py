@@ -326,3 +326,22 @@ def test_a_bad_picture_stops_or_is_skipped(facade, photos, tmp_path):
     assert one.returncode == 0
     assert len(json.loads(one.stdout)["regions"]) == 1
     assert facade("parse-image", tiny, "--grammar", "tskp10").returncode == 4
+
+
+def test_a_rectified_photograph_keeps_its_name_and_homography(facade, tmp_path):
+    photo = "sample_data/photos/at-an-angle.jpg"
+    straight, report = tmp_path / "straight.png", tmp_path / "report.json"
+    facade("rectify", photo, "-o", straight, "--report", report)
+    by_hand = json.loads(facade("parse-image", straight).stdout)
+    for asked in ("auto", report):
+        done = facade("parse-image", photo, "--rectify", asked)
+        assert done.returncode == 0, done.stderr
+        parse = json.loads(done.stdout)
+        assert parse["image"]["name"] == "at-an-angle.jpg"
+        assert parse["image"]["size"] == by_hand["image"]["size"]
+        assert parse["regions"] == by_hand["regions"]
+        wanted = json.loads(report.read_text())["homography"]
+        np.testing.assert_allclose(parse["rectification"], wanted)
+    other = facade("parse-image", straight, "--rectify", report)
+    assert other.returncode == 3
+    assert b"another picture" in other.stderr

@@ -14,7 +14,7 @@ LABELS = ("outlier", "window", "wall", "balcony", "door", "roof", "sky", "shop",
 
 @dataclass(frozen=True, slots=True)
 class ImageInfo:
-    """The picture that was read: file name, [width, height] as shown, SHA-256 of the file."""
+    """The photograph: file name, SHA-256 of the file, [width, height] of the rectified image."""
 
     name: str
     size: tuple[int, ...]

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..artifacts.parse import LABELS, Parse
+from .homography import warped
 from .image_io import Picture, fitted, read_photo
 
 COLORS = {
@@ -49,8 +50,10 @@ def parse_view(parse: Parse) -> Picture:
     path = Path(parse.image.name)
     if path.name == parse.image.name and path.is_file():
         photo = read_photo(str(path))
-        if photo.sha256 == parse.image.sha256 and photo.pixels.shape[1::-1] == parse.image.size:
-            return _shrunk(overlay(photo.pixels, parse))
+        if photo.sha256 == parse.image.sha256:
+            turn = np.array(parse.rectification, np.float64)
+            straight = warped(photo.pixels, turn, (parse.image.size[0], parse.image.size[1]))
+            return _shrunk(overlay(straight, parse))
     width, height = parse.image.size
     return _shrunk(overlay(np.zeros((height, width, 3), np.uint8), parse, 1.0))
 

@@ -7,6 +7,7 @@ up to scale; where they do not fix the focal length (one of them far away) a usu
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..errors import InvalidInput
 from .homography import Homography, Points, applied, fitted_homography, warped
-from .image_io import Picture
+from .image_io import MAX_PIXELS, MAX_SIDE, Picture
 from .rectify_lines import segments_of, vanishing_points
 
 Vector = NDArray[np.float64]  # (3,) homogeneous
@@ -37,6 +38,11 @@ class Rectification:
     homography: Homography
     confidence: float
     size: tuple[int, int]
+
+    @property
+    def rows(self) -> tuple[tuple[float, ...], ...]:
+        """The homography as rows of numbers."""
+        return tuple(tuple(float(entry) for entry in row) for row in self.homography)
 
     def picture(self, photo: Picture) -> Picture:
         """Return the rectified picture."""
@@ -62,6 +68,19 @@ def from_corners(shape: tuple[int, ...], corners: Points) -> Rectification:
     size = _size(width * scale, height * scale, shape)
     target = np.array([[0, 0], [size[0], 0], size, [0, size[1]]], np.float64)
     return Rectification(fitted_homography(corners, target), 1.0, size)
+
+
+def from_report(
+    homography: Sequence[Sequence[float]], size: Sequence[int], confidence: float
+) -> Rectification:
+    """Return the rectification of given numbers. Raises ValueError on what is none."""
+    matrix = np.array(homography, np.float64)
+    width, height = (int(side) for side in size)
+    if matrix.shape != (3, 3) or not np.isfinite(matrix).all() or abs(np.linalg.det(matrix)) == 0:
+        raise ValueError("no homography")
+    if min(width, height) < 1 or max(width, height) > MAX_SIDE or width * height > MAX_PIXELS:
+        raise ValueError("no size of a picture")
+    return Rectification(matrix, float(confidence), (width, height))
 
 
 def automatic(picture: Picture) -> Rectification:

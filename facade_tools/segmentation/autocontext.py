@@ -103,16 +103,20 @@ def sample_pixels(
 
 
 def train_stages(
-    examples: Sequence[Example], fit: Fit, stages: int, pixels: int, *, rng: np.random.Generator
+    examples: Sequence[Example],
+    fits: Sequence[Fit],
+    pixels: int,
+    *,
+    rng: np.random.Generator,
 ) -> tuple[Trees, ...]:
-    """Return the stages of a classifier.
+    """Return the stages of a classifier, one a fit.
 
     The belief that a stage trains on comes from models that did not see the picture: the stage
     before is trained once for each fold without it, and once on everything to be kept.
     """
     before: list[Probabilities | None] = [None] * len(examples)
     kept: list[Trees] = []
-    for _ in range(stages - 1):
+    for fit in fits[:-1]:
         chosen = [sample_pixels(e.coarse_labels > 0, pixels, rng) for e in examples]
         codes = [_codes(e, b, at) for e, b, at in zip(examples, before, chosen, strict=True)]
         labels = [
@@ -121,7 +125,7 @@ def train_stages(
         ]
         kept.append(fit(np.concatenate(codes), np.concatenate(labels)))
         before = list(_left_out(examples, before, codes, labels, fit))
-    kept.append(_last_stage(examples, before, fit, pixels, rng))
+    kept.append(_last_stage(examples, before, fits[-1], pixels, rng))
     return tuple(kept)
 
 

@@ -18,14 +18,13 @@ class BoostOptions:
     """How trees are grown.
 
     rounds: trees a class. leaves, depth: of one tree. rate: shrinkage. least: pixels a leaf.
-    share, most_features: of all features, how
-    many a tree may look at.
+    share, most_features: of all features, how many a tree may look at.
     """
 
-    rounds: int = 60
+    rounds: int = 80
     leaves: int = 32
     depth: int = 8
-    rate: float = 0.15
+    rate: float = 0.13
     least: int = 40
     share: float = 0.25
     most_features: int = 40
@@ -52,9 +51,9 @@ def train_boosted(
         "max_depth": options.depth, "learning_rate": options.rate,
         "min_data_in_leaf": options.least, "feature_fraction": share,
         "lambda_l2": 2.0, "max_bin": 63, "num_threads": 1, "verbosity": -1, "seed": seed,
-        "deterministic": True, "force_row_wise": True,
+        "deterministic": True, "force_col_wise": True, "bin_construct_sample_cnt": 10_000,
     }  # fmt: skip
-    data = lightgbm.Dataset(codes, labels, weight=weights, free_raw_data=True)
+    data = lightgbm.Dataset(codes, labels, weight=weights, params=settings)
     booster = lightgbm.train(settings, data, options.rounds)
     dumped = booster.dump_model()["tree_info"]
     return packed([_linked(tree["tree_structure"]) for tree in dumped], classes)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -33,16 +34,18 @@ class TrainOptions:
     coarse: rows at which all stages but the last look. pixels: sampled a picture, variant and
     stage. inner: folds by picture for the beliefs that later stages train on. augment: varied
     copies a picture. balance: 0 weighs pixels equally, 1 gives each class the same weight.
+    early, boost: trees of all stages but the last, and of the last.
     """
 
     features: str = "context"
     stages: int = 3
     height: int = 576
     coarse: int = 288
-    pixels: int = 2000
+    pixels: int = 1300
     inner: int = 2
-    augment: int = 0
+    augment: int = 1
     balance: float = 0.0
+    early: BoostOptions = field(default_factory=lambda: BoostOptions(rounds=50, rate=0.17))
     boost: BoostOptions = field(default_factory=BoostOptions)
     forest: ForestOptions = field(default_factory=ForestOptions)
 
@@ -97,11 +100,12 @@ def train(pairs: Sequence[Pair], options: TrainOptions, *, rng: np.random.Genera
     examples = list(_examples(small, options, rng))
     seed = int(rng.integers(2**31))
 
-    def fit(codes: Codes, labels: NDArray[np.intp]) -> Trees:
+    def fit(boost: BoostOptions, codes: Codes, labels: NDArray[np.intp]) -> Trees:
         weights = class_weights(labels, len(classes), options.balance)
-        return train_boosted(codes, labels, weights, len(classes), options.boost, seed=seed)
+        return train_boosted(codes, labels, weights, len(classes), boost, seed=seed)
 
-    stages = train_stages(examples, fit, options.stages, options.pixels, rng=rng)
+    fits = [partial(fit, options.early)] * (options.stages - 1) + [partial(fit, options.boost)]
+    stages = train_stages(examples, fits, options.pixels, rng=rng)
     return Classifier("context", classes, stages, height, options.coarse, 0, about)
 
 

@@ -58,10 +58,12 @@ on_error = click.option(
 )
 
 
-def stream_options(metavar: str, *, seeded: bool = True) -> Callable[[F], Callable[..., Any]]:
+def stream_options(
+    metavar: str, *, seeded: bool = True, required: bool = True
+) -> Callable[[F], Callable[..., Any]]:
     """All options of a stage that maps over a stream, gathered in one argument `stream`.
 
-    A stage that draws no random numbers is not `seeded`.
+    A stage that draws no random numbers is not `seeded`. Inputs may be `required`.
     """
 
     def decorate(function: F) -> Callable[..., Any]:
@@ -71,7 +73,14 @@ def stream_options(metavar: str, *, seeded: bool = True) -> Callable[[F], Callab
             taken = {name: values.pop(name) for name in names if name in values}
             return function(stream=StreamOptions(**{"seed": None, **taken}), **values)
 
-        options = [inputs(metavar), output, *([seed] if seeded else []), jobs, scheduler, on_error]
+        options = [
+            inputs(metavar, required),
+            output,
+            *([seed] if seeded else []),
+            jobs,
+            scheduler,
+            on_error,
+        ]
         decorated: Callable[..., Any] = gather
         for option in reversed(options):
             decorated = option(decorated)

@@ -84,11 +84,16 @@ def side_input(path: str | None) -> tuple[Source, ...]:
 
 def run_stream(stage: ItemStage, stream: StreamOptions) -> None:
     """Run a stage over all inputs; raises the first error, or after --on-error skip the last."""
-    stage = replace(stage, seed=stream.seed, indented=_single(stream.output))
-    outcomes = map_ordered(
-        stage, read_raw(stream.inputs), jobs=stream.jobs, scheduler=stream.scheduler
-    )
-    progress = Progress(stage.name)
+    made = replace(stage, seed=stream.seed, indented=_single(stream.output))
+    run_items(stage.name, made, read_raw(stream.inputs), stream)
+
+
+def run_items(
+    name: str, function: Callable[[Any], ItemResult], items: Iterable[Any], stream: StreamOptions
+) -> None:
+    """Write what `function` makes of each item; raises as `run_stream` does."""
+    outcomes = map_ordered(function, items, jobs=stream.jobs, scheduler=stream.scheduler)
+    progress = Progress(name)
     bad = 0
     with open_sink(stream.output) as write, closing(outcomes):
         for outcome in outcomes:
@@ -102,7 +107,7 @@ def run_stream(stage: ItemStage, stream: StreamOptions) -> None:
                 _show_remote(outcome.traceback)
                 raise outcome.error
             else:
-                say_error(stage.name, outcome.error)
+                say_error(name, outcome.error)
                 bad += 1
             progress.advance()
         progress.close()

@@ -18,12 +18,11 @@ from ..grammar.derivation import leaves, painted
 from ..grammar.reading import Method, Reading, ReadOptions, label_index
 from ..imaging.image_io import Photo, fitted
 from . import storeys as floors_module
-from .chains import Chain
 from .evidence import Evidence, agreement, profiles, window_evidence
 from .lines import differences, segments
 from .potentials import CELL
 from .storeys import STOREY, Band, Facade, period, skyline, storeys
-from .stripes import spans, stripes
+from .stripes import Span, spans, stripes
 
 ROWS, PIXELS = 320, 160_000  # the working picture
 MOST = 1500  # cells a side
@@ -60,7 +59,8 @@ def read_facade(
     del rng
     facade, cell = in_cells(photo, scale, mask)
     bands, energy = storeys(facade)
-    columns = stripes(facade)
+    chain = stripes(facade)
+    columns = spans(chain, bands, facade.plane)
     shape = photo.pixels.shape[:2]
     tree = _tree(facade, bands, columns, shape)
     parse = Parse(
@@ -71,12 +71,12 @@ def read_facade(
         solver="chain",
         grammar="ksttp09",
         classifier="none",
-        energy=energy + columns.energy,
+        energy=energy + chain.energy,
         working=(facade.plane.shape[1], facade.plane.shape[0]),
         regions=tuple(_regions(tree)),
         floors=tuple(_floors(tree)),
         columns=_borders(facade, columns, shape),
-        bound=energy + columns.energy,
+        bound=energy + chain.energy,
         optimal=True,
         derivation=tree,
         tags=_tags(scale, cell, facade, shape),
@@ -156,17 +156,17 @@ WALLS = {"ground": "shop", "floor": "wall", "roof": "roof"}
 SYMBOLS = {"ground": "Gf", "floor": "Fl", "roof": "Rf"}
 
 
-def _tree(facade: Facade, bands: list[Band], columns: Chain, shape: tuple[int, ...]) -> Node:
+def _tree(facade: Facade, bands: list[Band], columns: list[Span], shape: tuple[int, ...]) -> Node:
     """Return the derivation: up into ground floor, floors, roof and sky; right into windows."""
     at = _pixels(facade, shape)
     height, width = facade.plane.shape
-    children = [_storey(band, spans(columns), width, at) for band in bands]
+    children = [_storey(band, columns, width, at) for band in bands]
     if facade.sky > 0:
         children.append(Node("Sky", at.box(0, 0, width, facade.sky), label="sky"))
     return Node("Fc", at.box(0, 0, width, height), "up", None, tuple(children))
 
 
-def _storey(band: Band, stripes_: list[tuple[int, int]], width: int, at: _Pixels) -> Node:
+def _storey(band: Band, stripes_: list[Span], width: int, at: _Pixels) -> Node:
     """Return a storey: wall under, windows, wall over."""
     windows = band.high > band.low and bool(stripes_)
     label = "wall" if windows and band.kind == "ground" else WALLS[band.kind]
@@ -216,9 +216,9 @@ def _floors(tree: Node) -> list[Floor]:
     return out
 
 
-def _borders(facade: Facade, columns: Chain, shape: tuple[int, ...]) -> tuple[int, ...]:
+def _borders(facade: Facade, columns: list[Span], shape: tuple[int, ...]) -> tuple[int, ...]:
     at = _pixels(facade, shape)
-    edges = {0, facade.plane.shape[1], *(x for span in spans(columns) for x in span)}
+    edges = {0, facade.plane.shape[1], *(x for span in columns for x in span)}
     return tuple(round(x * at.x) for x in sorted(edges))
 
 

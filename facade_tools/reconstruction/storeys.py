@@ -12,7 +12,6 @@ from ..geometry.arrays import Floats
 from .chains import Chain, ChainProblem, solve
 from .evidence import agreement, along_columns, profiles, strength
 from .potentials import (
-    CELL,
     Weights,
     band_contents,
     best_band,
@@ -33,6 +32,8 @@ PEAK = 0.45  # a peak of the autocorrelation counts from this share of the highe
 SKY = 15.0  # CIELAB units between the sky and a building
 BUSY = 2.0  # how much windows above a line speak against its being the skyline
 UPPER = 0.3  # share of the building where roofs may be, and columns of their own
+OWN_ABOVE, OWN = 0.6, 0.4  # weights of what a row holds beside its agreement with the columns
+MEAN = 15.0  # cells: standard deviation of the local mean that is taken off
 WEIGHTS = Weights(alpha=4.0, beta=0.3, boundary=0.05, content=1.0)
 EMPTY = 0.75  # cost of a floor without a row of windows
 LINE = 0.3 / 40  # per CIELAB unit: what a difference in colour says for a building line
@@ -125,9 +126,9 @@ def row_profiles(facade: Facade) -> Rows:
     columns = np.maximum(columns / (np.percentile(columns, 90) + 1e-9), -0.3)
     any_ = strength(body, 4.0)
     any_ = any_ / (np.percentile(any_, 80) + 1e-9)
-    own = np.where(np.arange(len(body)) < UPPER * len(body), 0.6, 0.4)
+    own = np.where(np.arange(len(body)) < UPPER * len(body), OWN_ABOVE, OWN)
     mixed = (1 - own) * columns + own * any_
-    mean = along_columns(mixed, 0.5 * STOREY / CELL)
+    mean = along_columns(mixed, MEAN)
     return Rows(columns, mixed - mean)
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import Infeasible
-from ..geometry.arrays import Floats
 from .chains import Chain, ChainProblem, solve
 from .evidence import profiles
 from .potentials import (
@@ -18,12 +20,16 @@ from .potentials import (
     line_differences,
     run_contents,
 )
-from .storeys import Facade
+from .storeys import Band, Facade
 
 STRIPE = (5, 30)  # cells: widths of a stripe, 0.5 to 3 m
 GAP = 60  # cells: the widest wall between two stripes
 WEIGHTS = Weights(alpha=3.0, beta=0.4, boundary=0.05, gap=0.03, content=0.2)
 COST = 0.25  # of a stripe
+CELL_SHARE = 0.4  # of the usual evidence: from here a cell holds a window
+ROW_SHARE = 0.5  # of the rows: from here a stripe is one
+
+Span = tuple[int, int]
 
 
 def stripes(facade: Facade, *, gaps: bool = True) -> Chain:
@@ -52,13 +58,18 @@ def stripes(facade: Facade, *, gaps: bool = True) -> Chain:
         return Chain((), (), 0.0)
 
 
-def spans(chain: Chain) -> list[tuple[int, int]]:
-    """Return the stripes as (x0, x1) in cells."""
-    return [(start, start + size) for start, size in zip(chain.starts, chain.sizes, strict=True)]
+def spans(chain: Chain, bands: Sequence[Band], plane: NDArray[np.float32]) -> list[Span]:
+    """Return the stripes (x0, x1) in cells that hold something in most rows of windows.
 
-
-def evidence_of(facade: Facade) -> Floats:
-    """Return the columns' profile below the sky, (m,), 1 where windows are usual."""
-    across = profiles(facade.plane[facade.sky :])[1]
-    out: Floats = across / (np.percentile(across, 95) + 1e-9)
-    return out
+    A stripe beside the facade (a neighbour, the picture's rim) repeats nothing.
+    """
+    found = [(start, start + size) for start, size in zip(chain.starts, chain.sizes, strict=True)]
+    rows = [band for band in bands if band.high > band.low and band.kind != "roof"]
+    if not rows or not found:
+        return found
+    held = np.array(
+        [[plane[band.low : band.high, x0:x1].mean() for band in rows] for x0, x1 in found]
+    )
+    usual = float(np.median(held))
+    share = (held > CELL_SHARE * usual).mean(axis=1)
+    return [span for span, part in zip(found, share, strict=True) if part >= ROW_SHARE]

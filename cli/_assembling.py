@@ -1,0 +1,173 @@
+"""The body of `facade assemble`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, get_args
+
+import click
+
+from facade_tools.artifacts.building import SIDES, Box, Building, Roof, RoofStyle, Side
+from facade_tools.artifacts.documents import encode
+from facade_tools.artifacts.footprint import Footprint
+from facade_tools.artifacts.numbers import dump_document, dump_line
+from facade_tools.artifacts.provenance import Provenance, Source
+from facade_tools.artifacts.store import RawItem, digest, read_raw
+from facade_tools.errors import InvalidInput
+from facade_tools.formats.geojson import building_of
+from facade_tools.reconstruction.assemble import Assembly, assemble
+from facade_tools.reconstruction.sides import SideView, view_of_labels, view_of_parse
+from facade_tools.segmentation.conventions import Convention, convention
+
+from ._options import StreamOptions
+from ._report import collected_log
+from ._stream import ItemResult, open_sink, run_items, side_input
+
+NAME = "assemble"
+SIZE = re.compile(r"(\d+(?:\.\d+)?)[x×](\d+(?:\.\d+)?)")
+SIDE_LIMITS = (2.0, 1000.0)  # m
+PITCH = 35.0  # degrees of a roof whose pitch nobody says
+
+Item = RawItem | str  # of a stream of artifacts, or the path of a label map
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A view with the name and digest of what it was read from."""
+
+    id: str
+    view: SideView
+    source: Source
+
+
+@dataclass(frozen=True)
+class Assemble:
+    """Makes a building of one view in any process."""
+
+    known: Assembly
+    side: Side
+    classes: Convention
+    recorded: Mapping[str, Any]
+    sources: tuple[Source, ...]
+    indented: bool
+
+    def __call__(self, item: Item) -> ItemResult:
+        """Return the building of one view."""
+        with collected_log() as messages:
+            seen = _seen(item, self.classes)
+            return ItemResult((self.made({self.side: seen}),), messages)
+
+    def made(self, seen: Mapping[Side, Seen]) -> tuple[str, bytes]:
+        """Return id and bytes of the building that the views show, named after the first."""
+        identity = next(iter(seen.values())).id
+        views = {side: one.view for side, one in seen.items()}
+        inputs = (*(one.source for one in seen.values()), *self.sources)
+        building = assemble(identity, views, self.known)
+        provenance = Provenance(NAME, None, self.recorded, inputs)
+        document = encode(replace(building, provenance=provenance))
+        return identity, dump_document(document) if self.indented else dump_line(document)
+
+
+def run_assemble(stream: StreamOptions, values: Mapping[str, Any]) -> None:
+    """Make one building of the named sides, or one of every parse."""
+    given = {side: values[side] for side in SIDES if values[side] is not None}
+    if bool(given) == bool(stream.inputs):
+        raise click.UsageError("name parses, or sides with --front, --back, --left, --right")
+    footprint = values["footprint"]
+    recorded = {key: values[key] for key in ("side", "roof", "storey_height", "windows", "no_door")}
+    stage = Assemble(
+        Assembly(
+            None if footprint is None else _ground(footprint, values["metres"]),
+            values["storey_height"],
+            None if values["roof"] is None else _roof(values["roof"]),
+            values["windows"],
+            not values["no_door"],
+        ),
+        values["side"],
+        convention(values["classes"]),
+        recorded,
+        side_input(footprint if footprint and not SIZE.fullmatch(footprint) else None),
+        stream.output is not None and stream.output.lower().endswith(".json"),
+    )
+    if not given:
+        run_items(NAME, stage, _items(stream.inputs), stream)
+        return
+    with open_sink(stream.output) as write:
+        write(*stage.made({side: _only(path, stage.classes) for side, path in given.items()}))
+
+
+def _items(paths: tuple[str, ...]) -> Iterator[Item]:
+    for path in paths:
+        maps = sorted(Path(path).glob("*.png")) if Path(path).is_dir() else []
+        if maps:
+            yield from map(str, maps)
+        elif path.lower().endswith(".png"):
+            yield path
+        else:
+            yield from read_raw([path])
+
+
+def _only(path: str, classes: Convention) -> Seen:
+    items = list(_items((path,)))
+    if len(items) != 1:
+        raise InvalidInput(f"holds {len(items)} parses; expected one").at(path)
+    return _seen(items[0], classes)
+
+
+def _seen(item: Item, classes: Convention) -> Seen:
+    if isinstance(item, str):
+        source = digest(item)
+        try:
+            return Seen(Path(item).stem, view_of_labels(classes.read(item)), source)
+        except InvalidInput as error:
+            raise error.at(item) from None
+    parse = item.artifact("parse")
+    try:
+        return Seen(parse.id, view_of_parse(parse), item.provenance())
+    except InvalidInput as error:
+        raise error.at(item.source, item.line) from None
+
+
+def _ground(text: str, metres: bool) -> Building:
+    """Return the mass that a footprint gives; boxes of unknown height have none."""
+    sizes = SIZE.fullmatch(text)
+    if sizes:
+        width, depth = float(sizes[1]), float(sizes[2])
+        if not all(SIDE_LIMITS[0] <= side <= SIDE_LIMITS[1] for side in (width, depth)):
+            raise click.UsageError(f"--footprint {text}: expected 2 to 1000 m a side")
+        box = Box("main", "general", width / 2, depth / 2, width, depth)
+        return Building("footprint", (box,), partial=True)
+    found = list(_grounds(text, metres))
+    if len(found) != 1:
+        raise InvalidInput(f"holds {len(found)} footprints; expected one").at(text)
+    if isinstance(found[0], Footprint):
+        mass = building_of(found[0])
+        return mass if found[0].roof else _without_roofs(mass)
+    return replace(found[0], facades={})
+
+
+def _grounds(path: str, metres: bool) -> Iterator[Footprint | Building]:
+    from ._lots import artifacts_of
+
+    yield from artifacts_of(path, metres)
+
+
+def _without_roofs(mass: Building) -> Building:
+    boxes = tuple(replace(box, roof=None) for box in mass.boxes)
+    return replace(mass, boxes=boxes, complete=("mass",))
+
+
+def _roof(text: str) -> Roof:
+    style, pitch, direction, *rest = [*text.split(":"), "", ""][:3] + text.split(":")[3:]
+    styles = get_args(RoofStyle)
+    try:
+        degrees = float(pitch) if pitch else (0.0 if style == "flat" else PITCH)
+    except ValueError:
+        degrees = -1.0
+    if style not in styles or not 0 <= degrees < 80 or direction not in ("", "x", "y") or rest:
+        message = f"--roof {text!r}: expected STYLE[:PITCH[:x|y]], STYLE one of {', '.join(styles)}"
+        raise click.UsageError(message)
+    return Roof(style, degrees, "y" if direction == "y" else "x")  # type: ignore[arg-type]

@@ -20,13 +20,16 @@ import numpy as np
 from facade_tools.errors import FacadeError
 from facade_tools.formats.mesh_reader import ENDINGS, read_textured
 from facade_tools.formats.textured import Paint, TexturedMesh, joined
-from facade_tools.geometry.mesh import Scene
+from facade_tools.geometry.mesh import Material, Mesh, Scene
 from facade_tools.imaging.image_io import decoded
-from facade_tools.stylization.capture import CaptureOptions, capture_style
+from facade_tools.stylization.capture import capture_style
+from facade_tools.stylization.model import CaptureOptions
 from facade_tools.stylization.framing import standard_view, triangle_areas
 from facade_tools.stylization.projection import SIDES, _rasterise, palette
-from facade_tools.stylization.remesh import slabs, wall_faces
-from facade_tools.stylization.retarget import Style, resized, retarget
+from facade_tools.stylization.outline import wall_faces
+from facade_tools.stylization.remesh import slabs
+from facade_tools.stylization.resizing import resized
+from facade_tools.stylization.retarget import Style, retarget
 
 SIZE, RAYS = 160, 4
 
@@ -67,21 +70,17 @@ def ssim(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def as_textured(scene: Scene) -> TexturedMesh:
-    paints = {
-        name: Paint(name, picture=decoded(material.texture, name) if material.texture else None)
-        for name, material in scene.materials.items()
-    }
-    parts = [
-        TexturedMesh(
-            mesh.vertices,
-            mesh.faces,
-            mesh.uv[mesh.faces],
-            np.zeros(len(mesh.faces), dtype=np.int64),
-            (paints[mesh.material],),
-        )
-        for mesh in scene.meshes
-    ]
-    return joined(parts)
+    """The scene as a mesh that the same rasteriser can draw."""
+    return joined([_part(mesh, scene.materials[mesh.material]) for mesh in scene.meshes])
+
+
+def _part(mesh: Mesh, material: Material) -> TexturedMesh:
+    count = len(mesh.faces)
+    uv = np.full((count, 3, 2), np.nan) if mesh.uv is None else mesh.uv[mesh.faces]
+    color = tuple(int(material.color[k : k + 2], 16) for k in (1, 3, 5))
+    picture = decoded(material.texture, material.name) if material.texture else None
+    paints = (Paint(material.name, color, picture),)
+    return TexturedMesh(mesh.vertices, mesh.faces, uv, np.zeros(count, dtype=np.int64), paints)
 
 
 def period(render: np.ndarray, metres_a_pixel: float) -> float:

@@ -20,8 +20,10 @@ from facade_tools.formats.mesh_reader import ENDINGS, read_textured
 from facade_tools.formats.style_folder import read_style, write_style
 from facade_tools.randomness import item_generator
 from facade_tools.stylization.bases import building_blocks, mesh_blocks
-from facade_tools.stylization.capture import CaptureOptions, capture_style
-from facade_tools.stylization.retarget import Style, resized, retarget
+from facade_tools.stylization.capture import capture_style
+from facade_tools.stylization.model import CaptureOptions
+from facade_tools.stylization.resizing import resized
+from facade_tools.stylization.retarget import Style, retarget
 from facade_tools.stylization.structure import chosen_style
 
 from ._report import Progress

@@ -76,7 +76,7 @@ def command(
     Example:
       facade capture-style tower.obj -o tower-style
     """
-    from facade_tools.stylization.capture import CaptureOptions
+    from facade_tools.stylization.model import CaptureOptions
 
     from ._style import run_capture
 

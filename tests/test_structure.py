@@ -7,13 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from facade_tools.stylization.structure import (
-    cuts,
-    match_blocks,
-    match_costs,
-    snapped,
-    transformation_cost,
-)
+from facade_tools.stylization.snapping import snapped
+from facade_tools.stylization.structure import Candidate, cuts, match_blocks, match_costs
 
 sizes = st.lists(st.tuples(*[st.floats(1, 50)] * 3), min_size=1, max_size=5).map(np.array)
 places = st.lists(st.floats(0, 10), min_size=1, max_size=5).map(lambda v: np.array(sorted(v)))
@@ -33,17 +28,26 @@ def test_costs_equal_the_printed_formulas(sources, targets):
     table = match_costs(sources, targets)
     for (i, a), (j, b) in itertools.product(enumerate(sources), enumerate(targets)):
         va, vb = a.prod() / sources.prod(axis=1).sum(), b.prod() / targets.prod(axis=1).sum()
-        expected = transformation_cost(a, b) * max(va, vb) / min(va, vb)
+        ratio = (a / a.sum()) / (b / b.sum())
+        expected = np.maximum(ratio, 1 / ratio).prod() * max(va, vb) / min(va, vb)
         assert table[i, j] == pytest.approx(expected)
     assert (table >= 1 - 1e-9).all()
 
 
+def block(role, *size, place=(0.5, 0.5, 0.5)):
+    return Candidate(role, size, place)
+
+
 def test_a_model_matches_itself_and_roles_are_respected():
-    blocks = np.array([[10, 10, 4], [10, 10, 30], [6, 6, 3]], dtype=float)
-    roles = ["bottom", "body", "top"]
-    assert match_blocks(blocks, roles, blocks, roles) == [0, 1, 2]
-    assert match_blocks(blocks, roles, 2 * blocks[:1], ["top"]) == [2]
-    assert match_blocks(blocks[1:2], ["body"], blocks, roles) == [0, 0, 0]
+    blocks = [block("bottom", 10, 10, 4), block("body", 10, 10, 30), block("top", 6, 6, 3)]
+    assert match_blocks(blocks, blocks) == [0, 1, 2]
+    assert match_blocks(blocks, [block("top", 20, 20, 8)]) == [2]
+    assert match_blocks(blocks[1:2], blocks) == [0, 0, 0]
+
+
+def test_of_equal_blocks_the_one_that_lies_alike_is_taken():
+    twins = [block("body", 5, 9, 6, place=(x, 0.5, 0.5)) for x in (0.1, 0.9)]
+    assert match_blocks(twins, twins[::-1]) == [1, 0]
 
 
 @given(places, places)

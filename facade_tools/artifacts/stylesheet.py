@@ -99,6 +99,7 @@ class Rule:
 class StyleSheet:
     """The look of a building: `density` pixels a metre of its textures, `roof` the view from above.
 
+    resolution: pixels a metre of the source's own textures, where its pictures are finer or coarser.
     lost: share of the source's surface that its Manhattan model does not stand for.
     """
 
@@ -115,5 +116,6 @@ class StyleSheet:
     front: float = field(default=180.0, metadata={"keep": True})
     lost: float = field(default=0.0, metadata={"keep": True})
     notes: tuple[str, ...] = ()
+    resolution: float | None = None
     tags: Mapping[str, object] = field(default_factory=dict)
     provenance: Provenance | None = None

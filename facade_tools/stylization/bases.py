@@ -11,7 +11,7 @@ from ..artifacts.blocks import Block, Blocks
 from ..artifacts.building import Box, Building
 from ..formats.textured import TexturedMesh
 from ..geometry.arrays import Floats
-from .capture import CaptureOptions, structure
+from .model import CaptureOptions, modelled
 
 Rectangle = tuple[float, float, float, float]
 
@@ -79,4 +79,4 @@ def _frame(building: Building) -> tuple[tuple[float, ...], ...] | None:
 
 def mesh_blocks(mesh: TexturedMesh, identity: str) -> Blocks:
     """Return the blocks of a mesh by structure detection, in its own frame."""
-    return structure(mesh, identity, CaptureOptions()).blocks
+    return modelled(mesh, identity, CaptureOptions()).blocks

@@ -13,6 +13,7 @@ from ..geometry.arrays import Floats, Points3, Triangles
 
 UPRIGHT = 0.2  # |n_z| of what counts as wall
 LEVEL = 0.95  # |n_z| of what counts as flat roof or soffit
+ALONG = 0.3  # of the textured area: pictures that stand along y
 ALIGNED = math.cos(math.radians(10))
 REFUSED = 0.6  # share of area that no Manhattan model can stand for
 WORTH_SAYING = 0.05
@@ -104,8 +105,10 @@ def _texture_runs_along_y(mesh: TexturedMesh) -> bool:
     length = np.linalg.norm(gradient, axis=1)
     known = np.isfinite(length) & (length > 1e-12) & (size > 1e-20)
     unit = gradient[known] / length[known, None]
-    score = (0.5 * np.sqrt(size[known])) @ unit
-    return bool(known.any() and score[1] > 2 * max(float(score[2]), 0.0) and score[1] > 0)
+    area = 0.5 * np.sqrt(size[known])
+    score = area @ unit
+    # pictures may stand on their head, so either way along z speaks against y
+    return bool(known.any() and score[1] > max(2 * abs(float(score[2])), ALONG * area.sum()))
 
 
 def _main_angle(walls: Points3) -> float:

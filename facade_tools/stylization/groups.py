@@ -8,13 +8,18 @@ from itertools import pairwise
 import cv2
 import numpy as np
 
-from ..geometry.arrays import Floats
+from ..geometry.arrays import Booleans, Floats
 from ..imaging.image_io import Picture
-from .remesh import WallFace
+from .outline import WallFace
+from .rhythm import SHORTEST, period, periodic_labels, profile
 from .splitting import SplitRule, insertable_labels, merged, rule_of, variance_signal
 
 SHAPE_LINK = 0.9  # of eq. 1
 TEXTURE_LINK = 0.5  # of eq. 2
+LEAST_WINDOW = 0.3  # m
+LEAST_CONTRAST = 0.03  # of colours in 0..1
+NOISE = 0.7  # variance of walls over that of windows, above which there are no windows
+LUMPED = 1.6  # periods in one section
 MAX_AVERAGED = 64  # faces of a group that its mean texture is taken over
 
 
@@ -92,13 +97,37 @@ def group_rule(
     """Return the splitting rule of a group from the mean of its pictures (4.3.4).
 
     size: metres across the rule. axis: 0 splits columns (a horizontal rule), 1 splits rows.
-    window: objective window size (m); None takes the median of the sections found. Sections of
-    less than half of it are merged.
+    window: objective window size (m); None takes the median of the sections found, at least 0.3 m.
+    Sections of less than half of it are merged. Where the labels tell windows from walls nowhere
+    (a texture of noise) nothing is insertable; where they lump several periods of a texture that
+    repeats into one section, the periods are the sections.
     """
-    labels = insertable_labels(variance_signal(mean_picture(pictures), axis))
+    mean = mean_picture(pictures)
+    signal = variance_signal(mean, axis)
+    labels = insertable_labels(signal)
     place = size / len(labels)
-    least = _median_run(labels) if window is None else window / place
-    return rule_of(merged(labels, least), size)
+    length = period(profile(mean, axis, size), size) if size > 2 * SHORTEST else None
+    if not _telling(signal, labels, mean, axis):
+        labels = np.zeros_like(labels)
+    least = max(_median_run(labels), LEAST_WINDOW / place) if window is None else window / place
+    labels = merged(labels, least)
+    if length is not None and _longest_run(labels) * place > LUMPED * length:
+        labels = periodic_labels(signal, length / place)
+    return rule_of(labels, size)
+
+
+def _telling(signal: Floats, labels: Booleans, mean: Floats, axis: int) -> bool:
+    """Tell whether insertable places differ from scalable ones by more than noise does."""
+    if not labels.any() or labels.all():
+        return False
+    contrast = float(mean.var(axis=axis).mean(axis=-1).max()) ** 0.5
+    low, high = float(signal[~labels].mean()), float(signal[labels].mean())
+    return contrast > LEAST_CONTRAST and low < NOISE * high
+
+
+def _longest_run(labels: Booleans) -> int:
+    edges = np.flatnonzero(np.diff(labels.astype(np.int8))) + 1
+    return int(np.diff(np.concatenate([[0], edges, [len(labels)]])).max())
 
 
 def mean_picture(pictures: Sequence[Picture]) -> Floats:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,10 +13,11 @@ from ..formats.textured import TexturedMesh
 from ..geometry.arrays import Booleans, Floats, Integers
 from ..imaging.image_io import Picture
 from .framing import triangle_areas
-from .remesh import WallFace
+from .outline import WallFace
 
 MAX_SIDE = 4096  # pixels of one face
 MAX_PIXELS = 60_000_000  # of all faces together
+AMPLE_PIXELS = 12_000_000  # of all faces together, for more than the source's resolution
 DEFAULT_DENSITY = 16.0  # pixels a metre where the source has no textures
 MAX_DENSITY = 256.0
 REACH = 0.06  # of the plan's size: how far off a face its texture may lie
@@ -69,20 +71,23 @@ def texel_density(mesh: TexturedMesh) -> float:
     return float(density[order][np.searchsorted(weight, 0.5 * weight[-1])])
 
 
-def working_density(mesh: TexturedMesh, faces: list[WallFace]) -> float:
-    """Return the density (pixels a metre) at which the faces of a model fit the memory's bound."""
-    density = min(texel_density(mesh), MAX_DENSITY)
-    total = sum(face.width * face.height for face in faces)
-    return min(density, math.sqrt(MAX_PIXELS / max(total, 1e-9)))
+def working_density(faces: Sequence[WallFace], resolution: float) -> float:
+    """Return the density (pixels a metre) at which the pictures of faces are drawn.
+
+    Twice the source's resolution keeps what its own pixels show; the source's own where that
+    takes much memory, and less where even this exceeds the bound.
+    """
+    total = max(sum(face.width * face.height for face in faces), 1e-9)
+    source = min(resolution, MAX_DENSITY)
+    wanted = max(source, min(2 * source, math.sqrt(AMPLE_PIXELS / total)))
+    return min(wanted, math.sqrt(MAX_PIXELS / total))
 
 
-def face_pictures(
-    mesh: TexturedMesh, faces: list[WallFace], density: float
-) -> list[tuple[Picture, float]]:
-    """Return for every face its picture and the share of it that some texture covers.
+def face_pictures(mesh: TexturedMesh, faces: Sequence[WallFace], density: float) -> list[Picture]:
+    """Return the picture of every face.
 
     Of several triangles over one pixel the nearest to the face's plane wins. Pixels that nothing
-    covers take the mean colour of the face.
+    covers take the mean colour of the face, and faces that nothing covers that of the walls.
     """
     paints = palette(mesh)
     reach = REACH * float(np.ptp(mesh.vertices[:, :2], axis=0).max())
@@ -93,6 +98,7 @@ def face_pictures(
     # two-sided models show their texture on either winding
     facing = [np.flatnonzero(np.abs(vectors[:, axis]) > 0.5 * length) for axis in range(2)]
     bounds = [(corners[f].min(axis=1), corners[f].max(axis=1)) for f in facing]
+    usual = _usual_colour(mesh, length)
     results = []
     for face in faces:
         along, direction, depth, sign = SIDES[face.side]
@@ -107,8 +113,17 @@ def face_pictures(
         )
         shape = (_pixels(face.height, density), _pixels(face.width, density))
         scale = np.array([shape[1] / face.width, shape[0] / face.height])
-        results.append(_drawn(view, uv[near], mesh.paint[near], paints, scale, shape, reach))
+        drawn = _drawn(view, uv[near], mesh.paint[near], paints, scale, shape, reach)
+        results.append(usual.copy() if drawn is None else drawn)
     return results
+
+
+def _usual_colour(mesh: TexturedMesh, area: Floats) -> Picture:
+    """Return the mean colour of a mesh, weighted by area, as a picture of one pixel."""
+    means = [p.color if p.picture is None else p.picture.mean(axis=(0, 1)) for p in mesh.paints]
+    weights = np.bincount(mesh.paint, area, len(mesh.paints))
+    colour = weights @ np.array(means, dtype=np.float64) / max(weights.sum(), 1e-12)
+    return np.asarray(np.round(colour), dtype=np.uint8).reshape(1, 1, 3)
 
 
 def top_picture(mesh: TexturedMesh, low: Floats, high: Floats, density: float) -> Picture:
@@ -126,7 +141,8 @@ def top_picture(mesh: TexturedMesh, low: Floats, high: Floats, density: float) -
     uv = np.where(np.isfinite(mesh.uv), mesh.uv, 0.0)[flat]
     scale = np.array([shape[1] / width, shape[0] / depth])
     reach = float(np.ptp(mesh.vertices[:, 2])) + 1.0
-    return _drawn(view, uv, mesh.paint[flat], palette(mesh), scale, shape, reach)[0]
+    drawn = _drawn(view, uv, mesh.paint[flat], palette(mesh), scale, shape, reach)
+    return np.full((*shape, 3), 190, dtype=np.uint8) if drawn is None else drawn
 
 
 def _pixels(metres: float, density: float) -> int:
@@ -155,19 +171,19 @@ def _drawn(
     scale: Floats,
     shape: tuple[int, int],
     reach: float,
-) -> tuple[Picture, float]:
+) -> Picture | None:
+    """Return the picture of a face, None where nothing covers any of it."""
     pixels = view.copy()
     pixels[:, :, :2] *= scale
     picture = np.zeros((*shape, 3), dtype=np.uint8)
     depth = np.full(shape, reach)
     _rasterise(pixels, uv, paint, paints.pixels, paints.table, picture, depth)
     covered = depth < reach
-    share = float(covered.mean())
-    if 0 < share < 1:
+    if not covered.any():
+        return None
+    if not covered.all():
         picture[~covered] = np.round(picture[covered].mean(axis=0)).astype(np.uint8)
-    elif not share:
-        picture[:] = 190
-    return picture, share
+    return picture
 
 
 @compiled

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..compiled import compiled
 from ..errors import InvalidInput
 from ..geometry.arrays import Booleans, Floats, Integers, Points3, Triangles
+from .inside import bodies, covered_points, inside_cells
 
 HEIGHT_TOLERANCE = 0.0005  # of the height (4.1)
 LINE_TOLERANCE = 0.004  # of the plan's larger side, between parallel walls
@@ -54,10 +54,10 @@ def slabs(vertices: Points3, faces: Triangles) -> list[Slab]:
     roof) are left out. Raises InvalidInput where nothing encloses a plan.
     """
     levels = clustered_levels(vertices[np.unique(faces), 2])
-    triangles = vertices[faces]
+    model = _Model(vertices[faces], bodies(vertices, faces))
     found = []
     for bottom, top in itertools.pairwise(levels):
-        slab = _slab(triangles, float(bottom), float(top))
+        slab = _slab(model, float(bottom), float(top))
         if slab.cells.any():
             found.append(slab)
     if not found:
@@ -119,23 +119,55 @@ def _clusters(values: Floats, tolerance: float) -> Floats:
     return np.bincount(groups, values) / np.bincount(groups)
 
 
-def _slab(triangles: Floats, bottom: float, top: float) -> Slab:
-    segments = section(triangles, 0.5 * (bottom + top))
+@dataclass(frozen=True, slots=True)
+class _Model:
+    """Triangles (m, 3, 3) and the number of each one's body (m,)."""
+
+    triangles: Floats
+    bodies: Integers
+
+
+def _slab(model: _Model, bottom: float, top: float) -> Slab:
+    middle = 0.5 * (bottom + top)
+    segments, crossing = section(model.triangles, middle)
     if not len(segments):
         empty = np.zeros(2)
         return Slab(bottom, top, empty, empty, np.zeros((1, 1), dtype=bool))
     size = float(np.ptp(segments.reshape(-1, 2), axis=0).max())
     xs, ys = (_lines(segments, axis, min(LINE_TOLERANCE * size, FINEST)) for axis in (0, 1))
-    cells = inside_cells(segments, 0.5 * (xs[1:] + xs[:-1]), 0.5 * (ys[1:] + ys[:-1]))
-    return _trimmed(Slab(bottom, top, xs, ys, cells))
+    cells = _cells(model, segments, crossing, (xs, ys), middle)
+    return trimmed(Slab(bottom, top, xs, ys, cells))
 
 
-def section(triangles: Floats, height: float) -> Floats:
-    """Return the segments (n, 2, 2) in which triangles (m, 3, 3) meet the plane z = height."""
-    z = triangles[:, :, 2] - height
+def _cells(
+    model: _Model, segments: Floats, crossing: Integers, lines: tuple[Floats, Floats], z: float
+) -> Booleans:
+    """Return the cells of a section that are inside; a draw is decided by what covers the cell."""
+    x, y = (0.5 * (line[1:] + line[:-1]) for line in lines)
+    inside, undecided = inside_cells(segments, model.bodies[crossing], x, y)
+    if undecided.any():
+        rows, columns = np.nonzero(undecided)
+        level = model.triangles[~_upright(model.triangles)]
+        inside[rows, columns] = covered_points(np.column_stack([x[columns], y[rows]]), level, z)
+    return np.asarray(inside)
+
+
+def _upright(triangles: Floats) -> Booleans:
+    a, b, c = (triangles[:, k] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    return np.asarray(np.abs(normal[:, 2]) < 0.1 * np.linalg.norm(normal, axis=1))
+
+
+def section(triangles: Floats, height: float) -> tuple[Floats, Integers]:
+    """Return where triangles (m, 3, 3) meet the plane z = height.
+
+    Segments (n, 2, 2), and the index of the triangle of each (n,).
+    """
+    z = triangles[:, :, 2]
+    crossing = np.flatnonzero((z.max(axis=1) > height) & (z.min(axis=1) <= height))
+    t = triangles[crossing]
+    z = t[:, :, 2] - height
     above = z > 0
-    crossing = above.any(axis=1) & ~above.all(axis=1)
-    t, z, above = triangles[crossing], z[crossing], above[crossing]
     lone = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), (~above).argmax(axis=1))
     rows = np.arange(len(t))
     ends = []
@@ -143,7 +175,7 @@ def section(triangles: Floats, height: float) -> Floats:
         other = (lone + step) % 3
         share = z[rows, lone] / (z[rows, lone] - z[rows, other])
         ends.append(t[rows, lone, :2] + share[:, None] * (t[rows, other, :2] - t[rows, lone, :2]))
-    return np.stack(ends, axis=1) if len(t) else np.empty((0, 2, 2))
+    return (np.stack(ends, axis=1) if len(t) else np.empty((0, 2, 2))), crossing
 
 
 def _lines(segments: Floats, axis: int, tolerance: float) -> Floats:
@@ -156,57 +188,7 @@ def _lines(segments: Floats, axis: int, tolerance: float) -> Floats:
     return lines if len(lines) > 1 else np.array([lines[0], lines[0] + tolerance])
 
 
-def inside_cells(segments: Floats, xs: Floats, ys: Floats) -> Booleans:
-    """Return whether the points of a grid (len(ys), len(xs)) lie inside a section.
-
-    Each point asks four axis-parallel rays for the parity of their crossings and follows the
-    majority; a draw counts as outside. Walls may be there twice (two-sided models) or touch
-    (adjoining boxes): coincident crossings are counted once or each, whichever makes the rays
-    agree at more points, and the larger plan where both do.
-    """
-    size = float(np.ptp(segments)) if len(segments) else 0.0
-    options = []
-    for gap in (0.0, 1e-4 * size):
-        votes = _parities(segments, xs, ys, gap)
-        votes += _parities(segments[:, :, ::-1].copy(), ys, xs, gap).T
-        agreed = int(((votes == 0) | (votes == 4)).sum())
-        options.append((agreed, int((votes > 2).sum()), votes > 2))
-    return max(options, key=lambda option: option[:2])[2]
-
-
-@compiled
-def _parities(segments: Floats, xs: Floats, ys: Floats, gap: float) -> Integers:
-    """Count odd crossings to the left and to the right of every grid point.
-
-    Crossings nearer than `gap` to the one before are one crossing.
-    """
-    votes = np.zeros((len(ys), len(xs)), dtype=np.int64)
-    crossings = np.empty(len(segments))
-    for row in range(len(ys)):
-        y = ys[row]
-        count = 0
-        for k in range(len(segments)):
-            y0, y1 = segments[k, 0, 1], segments[k, 1, 1]
-            if (y0 > y) != (y1 > y):
-                share = (y - y0) / (y1 - y0)
-                crossings[count] = segments[k, 0, 0] + share * (
-                    segments[k, 1, 0] - segments[k, 0, 0]
-                )
-                count += 1
-        found = np.sort(crossings[:count])
-        kept = 0
-        for k in range(count):
-            if kept == 0 or found[k] - found[kept - 1] >= gap:
-                found[kept] = found[k]
-                kept += 1
-        found, count = found[:kept], kept
-        for column in range(len(xs)):
-            left = np.searchsorted(found, xs[column])
-            votes[row, column] = left % 2 + (count - left) % 2
-    return votes
-
-
-def _trimmed(slab: Slab) -> Slab:
+def trimmed(slab: Slab) -> Slab:
     """Drop grid lines that separate nothing."""
     if not slab.cells.any():
         return slab
@@ -221,75 +203,3 @@ def _needed(lines: Floats, cells: Booleans) -> tuple[Floats, np.ndarray]:
     padded = np.vstack([np.zeros_like(cells[:1]), cells, np.zeros_like(cells[:1])])
     keep = np.flatnonzero((padded[1:] != padded[:-1]).any(axis=1))
     return lines[keep], keep[:-1]
-
-
-@dataclass(frozen=True, slots=True)
-class WallFace:
-    """An upright rectangle of the outline of one slab.
-
-    side: front, right, back or left. place: coordinate of its plane (y of front and back, x of
-    the others). start, end: extent along the wall from left to right as seen from outside, as
-    the coordinate x (front, back) or y (right, left). slab: index.
-    """
-
-    side: str
-    slab: int
-    place: float
-    start: float
-    end: float
-    bottom: float
-    top: float
-
-    @property
-    def width(self) -> float:
-        """Width along the wall (m)."""
-        return abs(self.end - self.start)
-
-    @property
-    def height(self) -> float:
-        """Height (m)."""
-        return self.top - self.bottom
-
-
-def wall_faces(slab: Slab, index: int) -> list[WallFace]:
-    """Return the upright faces of a slab: one for every straight stretch of its outline."""
-    return [
-        *_faces_of_rows(slab, index, False),
-        *_faces_of_rows(slab, index, True),
-        *_faces_of_columns(slab, index, False),
-        *_faces_of_columns(slab, index, True),
-    ]
-
-
-def _runs(mask: Booleans) -> Integers:
-    padded = np.concatenate([[False], mask, [False]])
-    return np.flatnonzero(padded[1:] != padded[:-1]).reshape(-1, 2)
-
-
-def _faces_of_rows(slab: Slab, index: int, back: bool) -> list[WallFace]:
-    """Front faces look towards −y: inside above the line, outside below. Back the other way."""
-    padded = np.pad(slab.cells, ((1, 1), (0, 0)))
-    lower, upper = padded[:-1], padded[1:]
-    walls = lower & ~upper if back else upper & ~lower
-    faces = []
-    for row, y in enumerate(slab.ys):
-        for a, b in _runs(walls[row]):
-            x0, x1 = float(slab.xs[int(a)]), float(slab.xs[int(b)])
-            ends = (x1, x0) if back else (x0, x1)
-            side = "back" if back else "front"
-            faces.append(WallFace(side, index, float(y), *ends, slab.bottom, slab.top))
-    return faces
-
-
-def _faces_of_columns(slab: Slab, index: int, left: bool) -> list[WallFace]:
-    padded = np.pad(slab.cells, ((0, 0), (1, 1)))
-    lower, upper = padded[:, :-1], padded[:, 1:]
-    walls = upper & ~lower if left else lower & ~upper
-    faces = []
-    for column, x in enumerate(slab.xs):
-        for a, b in _runs(walls[:, column]):
-            y0, y1 = float(slab.ys[int(a)]), float(slab.ys[int(b)])
-            ends = (y1, y0) if left else (y0, y1)
-            side = "left" if left else "right"
-            faces.append(WallFace(side, index, float(x), *ends, slab.bottom, slab.top))
-    return faces

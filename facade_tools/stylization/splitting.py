@@ -135,17 +135,24 @@ def rule_of(labels: Booleans, size: float) -> SplitRule:
 def split(rule: SplitRule, size: float) -> Split:
     """Cut a face of `size` metres: repeat insertable sections, scale the others (eq. 8 and 9).
 
-    Eq. 8 packs as many windows as fit. Where the scalable sections would be squeezed to less
-    than 80%, the number of windows whose |log S_r| is least is taken instead.
+    Eq. 8 packs as many windows as fit. Where the scalable sections would be squeezed below 80% or
+    stretched beyond 125%, the number of windows whose |log S_r| is least is taken instead. Windows
+    keep their size, unless the rule has no walls at all.
     """
     if not rule.insertable:
         return Split((0,), (size,), 0, size / rule.size)
     packed = _count(rule, size)
     chosen = _arranged(rule, size, packed)
-    if chosen.stretch >= CROWDED:
+    if CROWDED <= chosen.stretch <= 1 / CROWDED:
         return chosen
-    options = (_arranged(rule, size, count) for count in range(packed, -1, -1))
+    options = (_arranged(rule, size, count) for count in range(packed + 1, -1, -1))
     return min(options, key=lambda option: abs(math.log(max(option.stretch, 1e-9))))
+
+
+def split_rule(rule: SplitRule, size: float) -> SplitRule:
+    """Return the rule of a face after the split: what a second split starts from."""
+    done = split(rule, size)
+    return SplitRule(done.sizes[::2], done.sizes[1::2])
 
 
 def _count(rule: SplitRule, size: float) -> int:
@@ -163,6 +170,8 @@ def _count(rule: SplitRule, size: float) -> int:
 
 
 def _arranged(rule: SplitRule, size: float, windows: int) -> Split:
+    if not windows:
+        return _plain(rule, size)
     sources = _sequence(rule, windows)
     fixed = math.fsum(rule.insertable[i // 2] for i in sources if i % 2)
     flexible = math.fsum(rule.scalable[i // 2] for i in sources if not i % 2)
@@ -172,6 +181,13 @@ def _arranged(rule: SplitRule, size: float, windows: int) -> Split:
     stretch = (size - fixed) / flexible
     sizes = tuple(_width(rule, i) * (1.0 if i % 2 else stretch) for i in sources)
     return Split(sources, sizes, windows, stretch)
+
+
+def _plain(rule: SplitRule, size: float) -> Split:
+    """Return a face without windows: all of it the widest wall of the rule."""
+    widest = max(range(len(rule.scalable)), key=rule.scalable.__getitem__)
+    stretch = size / rule.scalable[widest] if rule.scalable[widest] > 1e-9 else math.inf
+    return Split((2 * widest,), (size,), 0, stretch)
 
 
 def _sequence(rule: SplitRule, windows: int) -> tuple[int, ...]:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 import cv2
 import numpy as np
 
-from ..geometry.arrays import Floats
+from ..geometry.arrays import Floats, Integers
 from ..imaging.image_io import Picture
-from .splitting import SplitRule, split
+from .splitting import Split, SplitRule, split
+
+SMEARED = 2.0  # stretch of walls beyond which their texture repeats
 
 
 def resized_rule(rule: SplitRule, size: float) -> SplitRule:
@@ -36,8 +40,22 @@ def positions(rule: SplitRule, source: float, target: float, pixels: int) -> Flo
     starts = np.concatenate([[0.0], np.cumsum(widths)])[:-1]
     index = np.array(done.sources)[section]
     share = (centres - borders[section]) / np.maximum(np.diff(borders)[section], 1e-12)
+    share = _unsmeared(share, done, section)
     places: Floats = np.clip((starts[index] + share * widths[index]) / source, 0.0, 1.0)
     return places
+
+
+def _unsmeared(share: Floats, done: Split, section: Integers) -> Floats:
+    """Run through much stretched walls to and fro instead of smearing their pixels.
+
+    An odd number of runs begins and ends like the section itself.
+    """
+    if not SMEARED < done.stretch < math.inf:
+        return share
+    runs = 2 * round((done.stretch - 1) / 2) + 1
+    wall = np.array(done.sources)[section] % 2 == 0
+    to_and_fro = np.abs((share * runs + 1) % 2 - 1)
+    return np.where(wall, to_and_fro, share)
 
 
 def synthesised(

@@ -1,0 +1,175 @@
+"""Faces of the source put onto the target, and what of them can be seen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..artifacts.stylesheet import StyleFace, StyleSheet
+from ..geometry.arrays import Booleans, Floats
+from .placing import TOUCH, Placed, face_corners
+from .projection import SIDES
+from .remesh import Slab
+from .splitting import SplitRule
+
+SMALL = 0.05  # of a side's area: groups below it take the texture of a large one
+ALIGNED = 0.9  # shared width over the larger one, for two faces to stand on each other
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """A face of the result.
+
+    corners (4, 3): lower left, lower right, upper right, upper left as seen from outside.
+    source, target: width and height (m) before and after. rules: for columns and for rows.
+    seen (k, 4): what of it is not hidden, as left, bottom, right, top in shares of the face.
+    """
+
+    block: int
+    side: str
+    corners: Floats
+    texture: str
+    group: str
+    source: tuple[float, float]
+    target: tuple[float, float]
+    rules: tuple[SplitRule, SplitRule]
+    seen: Floats
+
+
+def panels(sheet: StyleSheet, placed: Sequence[Placed], slabs: Sequence[list[Slab]]) -> list[Panel]:
+    """Return the visible faces of placed blocks; slabs: the plans of each block's storeys."""
+    rules = {rule.id: SplitRule(rule.a, rule.b) for rule in sheet.rules}
+    of_group = {group.id: rules[group.rule] for group in sheet.groups}
+    walls: dict[tuple[str, int], list[tuple[str, StyleFace]]] = {}
+    for wall in sheet.walls:
+        for face in wall.faces:
+            walls.setdefault((wall.block, face.floor), []).append((wall.side, face))
+    found = []
+    for index, item in enumerate(placed):
+        others = [slab for k, own in enumerate(slabs) if k != index for slab in own]
+        for storey in item.storeys:
+            for side, face in walls.get((item.source.id, storey.floor), []):
+                corners = face_corners(item, storey, face, side)
+                used = (of_group[face.vertical], of_group[face.horizontal])
+                panel = _panel(index, side, corners, face, used)
+                if panel is not None and len(seen := _seen(panel, others)):
+                    found.append(replace(panel, seen=seen))
+    return found
+
+
+def _panel(
+    block: int, side: str, corners: Floats, face: StyleFace, rules: tuple[SplitRule, SplitRule]
+) -> Panel | None:
+    """Return a face as a panel, None where it is squeezed to nothing."""
+    source = (abs(face.end - face.start), face.top - face.bottom)
+    along, direction, _, _ = SIDES[side]
+    width = direction * float(corners[1, along] - corners[0, along])
+    target = (width, float(corners[2, 2] - corners[1, 2]))
+    if min(target) <= TOUCH or min(source) <= 0:
+        return None
+    whole = np.array([[0.0, 0.0, 1.0, 1.0]])
+    return Panel(block, side, corners, face.texture, face.vertical, source, target, rules, whole)
+
+
+def _seen(panel: Panel, others: Sequence[Slab]) -> Floats:
+    """Return the rectangles (k, 4) of a panel that no other block's slab covers, in shares."""
+    along, direction, depth, sign = SIDES[panel.side]
+    (left, right), place = panel.corners[:2, along], panel.corners[0, depth] + sign * 1e-4
+    bottom, top = panel.corners[0, 2], panel.corners[2, 2]
+    low, high = sorted((float(left), float(right)))
+    covers = [
+        (a, b, slab.bottom, slab.top)
+        for slab in others
+        if slab.bottom < top - TOUCH and slab.top > bottom + TOUCH
+        for a, b in _stretches(slab, depth, place, low, high)
+    ]
+    if not covers:
+        return panel.seen
+    lines = [sorted({low, high, *(v for a, b, _, _ in covers for v in (a, b) if low < v < high)})]
+    lines += [
+        sorted({bottom, top, *(v for _, _, a, b in covers for v in (a, b) if bottom < v < top)})
+    ]
+    us, vs = (np.array(line) for line in lines)
+    hidden = np.zeros((len(vs) - 1, len(us) - 1), dtype=bool)
+    u, v = 0.5 * (us[1:] + us[:-1]), 0.5 * (vs[1:] + vs[:-1])
+    for a, b, c, d in covers:
+        hidden |= ((v > c) & (v < d))[:, None] & ((u > a) & (u < b))[None]
+    us = (us - left) / (right - left)
+    vs = (vs - bottom) / (top - bottom)
+    boxes = [(us[a], vs[r], us[b], vs[q]) for r, q, a, b in rectangles(~hidden)]
+    seen = np.array(boxes).reshape(-1, 4)
+    return seen if direction * (right - left) > 0 else seen[:, [2, 1, 0, 3]]
+
+
+def _stretches(
+    slab: Slab, depth: int, place: float, low: float, high: float
+) -> Iterator[tuple[float, float]]:
+    """Yield where a slab's plan covers the line at `place` between low and high."""
+    across, along = (slab.ys, slab.xs) if depth == 1 else (slab.xs, slab.ys)
+    row = int(np.searchsorted(across, place)) - 1
+    if not 0 <= row < len(across) - 1 or along[0] > high or along[-1] < low:
+        return
+    line = slab.cells[row] if depth == 1 else slab.cells[:, row]
+    padded = np.concatenate([[False], line, [False]])
+    for a, b in np.flatnonzero(padded[1:] != padded[:-1]).reshape(-1, 2):
+        yield float(along[a]), float(along[b])
+
+
+def rectangles(mask: Booleans) -> Iterator[tuple[int, int, int, int]]:
+    """Yield rectangles (first row, last, first column, last; exclusive) that tile a mask.
+
+    Equal runs in successive rows are one rectangle.
+    """
+    open_: dict[tuple[int, int], int] = {}
+    for row in range(len(mask) + 1):
+        line = mask[row] if row < len(mask) else np.zeros_like(mask[0])
+        padded = np.concatenate([[False], line, [False]])
+        edges = np.flatnonzero(padded[1:] != padded[:-1]).reshape(-1, 2).tolist()
+        runs = {(a, b) for a, b in edges}
+        for run in [run for run in open_ if run not in runs]:
+            yield open_.pop(run), row, *run
+        for run in sorted(runs):
+            open_.setdefault(run, row)
+
+
+def reassigned(found: Sequence[Panel], foreign: Sequence[int], small: float = SMALL) -> list[Panel]:
+    """Give panels of small groups the texture of a large group below or above (5.2.2).
+
+    foreign: blocks that do not stand on their neighbours as in the source; only their panels
+    change. small: share of a side's area below which a group is small.
+    """
+    areas: dict[tuple[str, str], float] = {}
+    sides: dict[str, float] = {}
+    for panel in found:
+        area = panel.target[0] * panel.target[1]
+        key = (panel.side, panel.group)
+        areas[key] = areas.get(key, 0.0) + area
+        sides[panel.side] = sides.get(panel.side, 0.0) + area
+
+    def large(panel: Panel) -> bool:
+        return areas[panel.side, panel.group] >= small * sides[panel.side]
+
+    givers = [panel for panel in found if large(panel)]
+    result = []
+    for panel in found:
+        donors = []
+        if panel.block in foreign and not large(panel):
+            donors = [g for g in givers if g.block != panel.block and _in_line(g, panel)]
+        if donors:
+            best = min(donors, key=lambda g: abs(g.corners[0, 2] - panel.corners[0, 2]))
+            panel = replace(
+                panel, texture=best.texture, group=best.group, source=best.source, rules=best.rules
+            )
+        result.append(panel)
+    return result
+
+
+def _in_line(a: Panel, b: Panel) -> bool:
+    """Tell whether two panels of a side stand above one another."""
+    if a.side != b.side:
+        return False
+    along = SIDES[a.side][0]
+    (a0, a1), (b0, b1) = (sorted(panel.corners[:2, along].tolist()) for panel in (a, b))
+    return bool(min(a1, b1) - max(a0, b0) > ALIGNED * max(a1 - a0, b1 - b0))

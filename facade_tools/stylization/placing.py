@@ -1,0 +1,301 @@
+"""Source blocks put onto target blocks: along each axis a map from old places to new ones.
+
+The corners of a block are its correspondences (LNSW13 5.1.2). Between them the maps are linear
+until walls are flattened (overhangs) or snapped (vertical edges); storeys are inserted, not
+stretched.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from ..artifacts.blocks import Block, Blocks
+from ..artifacts.stylesheet import StyleBlock, StyleFace, StyleFloor, StyleSheet
+from ..geometry.arrays import Floats
+from .remesh import Slab, plan_difference, trimmed
+from .snapping import snapped
+from .structure import candidates, match_blocks
+
+TOUCH = 1e-6  # m
+SUPPORT = 0.9  # of the distance of the outer boundaries: thickness of a wall under an overhang
+SAME = 0.02  # share of the plan, of the height: storeys that differ less are one storey repeated
+Knots = tuple[Floats, Floats]
+
+
+@dataclass(frozen=True, slots=True)
+class Storey:
+    """A floor of the source put between two heights of the target (m, absolute)."""
+
+    floor: int
+    bottom: float
+    top: float
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """A source block on a target block.
+
+    maps: for x and y, places in the source block (m) and where they go (m, absolute).
+    """
+
+    target: Block
+    source: StyleBlock
+    storeys: tuple[Storey, ...]
+    maps: tuple[Knots, Knots]
+
+    def moved(self, axis: int, places: Floats) -> Floats:
+        """Return where places (m) of the source block go along an axis (0 x, 1 y)."""
+        old, new = self.maps[axis]
+        inside: Floats = np.interp(places, old, new)
+        return inside
+
+
+def placed_blocks(sheet: StyleSheet, own: Blocks, target: Blocks) -> list[Placed]:
+    """Return the source block of least Ψ on every target block (eq. 6, 7), mapped to its corners.
+
+    Then, from the ground up, walls under overhangs are thinned and edges snapped to the blocks
+    below (5.1.2, 5.2.1) unless the two source blocks stand on each other like that themselves.
+    """
+    sources = {block.id: block for block in sheet.blocks}
+    known = [block for block in own.blocks if block.id in sources]
+    chosen = match_blocks(candidates(known), candidates(target.blocks))
+    placed = [
+        _stretched(sheet, sources[known[index].id], block)
+        for block, index in zip(target.blocks, chosen, strict=True)
+    ]
+    for pair in _stacked(placed):
+        if not _native(own, placed[pair[0]], placed[pair[1]]):
+            _supported(sheet, placed, pair)
+    order = sorted(_stacked(placed), key=lambda pair: placed[pair[1]].target.z)
+    for lower, upper in order:
+        if not _native(own, placed[lower], placed[upper]):
+            placed[upper] = _snapped(sheet, placed[lower], placed[upper])
+    return placed
+
+
+def foreign_blocks(own: Blocks, placed: Sequence[Placed]) -> list[int]:
+    """Return the placed blocks that stand on others unlike their sources do."""
+    return [j for i, j in _stacked(placed) if not _native(own, placed[i], placed[j])]
+
+
+def placed_slabs(sheet: StyleSheet, placed: Placed) -> list[Slab]:
+    """Return the plans of a placed block's storeys, in the target's coordinates."""
+    slabs = []
+    for storey in placed.storeys:
+        floor = sheet.floors[storey.floor]
+        xs, ys = (placed.moved(a, np.array(v)) for a, v in enumerate((floor.xs, floor.ys)))
+        plan = _without_nothing(Slab(storey.bottom, storey.top, xs, ys, cells(floor)))
+        if plan.cells.any():
+            slabs.append(plan)
+    return slabs
+
+
+def cells(floor: StyleFloor) -> np.ndarray:
+    """Return the plan of a floor as a mask (len(ys) − 1, len(xs) − 1)."""
+    return np.array([[cell == "1" for cell in row] for row in floor.cells], dtype=bool)
+
+
+def _without_nothing(slab: Slab) -> Slab:
+    """Drop rows and columns that are squeezed to nothing."""
+    columns, rows = np.diff(slab.xs) > TOUCH, np.diff(slab.ys) > TOUCH
+    xs = np.append(slab.xs[:-1][columns], slab.xs[-1])
+    ys = np.append(slab.ys[:-1][rows], slab.ys[-1])
+    return trimmed(replace(slab, xs=xs, ys=ys, cells=slab.cells[np.ix_(rows, columns)]))
+
+
+def _stretched(sheet: StyleSheet, source: StyleBlock, block: Block) -> Placed:
+    maps = tuple(
+        (np.array([0.0, size]), np.array([low, low + length]))
+        for size, low, length in (
+            (source.size[0], block.x, block.width),
+            (source.size[1], block.y, block.depth),
+        )
+    )
+    return Placed(block, source, _storeys(sheet, source, block), (maps[0], maps[1]))
+
+
+# --- heights --------------------------------------------------------------------------------------
+def _storeys(sheet: StyleSheet, source: StyleBlock, block: Block) -> tuple[Storey, ...]:
+    """Return a block's floors at their new heights: like storeys repeated as often as fits best."""
+    floors = [i for i, floor in enumerate(sheet.floors) if floor.block == source.id]
+    first, unit, repeats = _run_of_storeys(sheet, floors)
+    order = floors
+    if repeats > 1:
+        lengths = [sheet.floors[i].top - sheet.floors[i].bottom for i in floors]
+        one = sum(lengths[first : first + unit * repeats]) / repeats
+        fixed = sum(lengths) - one * repeats
+        wanted = max(1, round((block.height - fixed) / one))
+        inner = [floors[first + k % (unit * repeats)] for k in range(unit * wanted)]
+        order = [*floors[:first], *inner, *floors[first + unit * repeats :]]
+    heights = np.array([sheet.floors[i].top - sheet.floors[i].bottom for i in order])
+    levels = block.z + np.concatenate([[0.0], np.cumsum(heights)]) * block.height / heights.sum()
+    return tuple(
+        Storey(floor, float(bottom), float(top))
+        for floor, bottom, top in zip(order, levels[:-1], levels[1:], strict=True)
+    )
+
+
+def _run_of_storeys(sheet: StyleSheet, floors: Sequence[int]) -> tuple[int, int, int]:
+    """Return first floor, floors a storey, and number of storeys of the highest run of like ones.
+
+    A storey may be several slabs (a window band, a parapet); like ones agree in height and plan.
+    """
+    plans = [_plan(sheet.floors[i]) for i in floors]
+    best = (0.0, 0, 1, 1)
+    for unit in range(1, min(6, len(plans) // 2) + 1):
+        like = [_like(plans[k], plans[k + unit]) for k in range(len(plans) - unit)]
+        start = 0
+        for k in range(len(like) + 1):
+            if k < len(like) and like[k]:
+                continue
+            repeats = (k - start) // unit + 1 if k > start else 1
+            height = sum(plan.height for plan in plans[start : start + unit * repeats])
+            if repeats > 1 and height > best[0] * 1.01:
+                best = (height, start, unit, repeats)
+            start = k + 1
+    return best[1:]
+
+
+def _plan(floor: StyleFloor) -> Slab:
+    return Slab(floor.bottom, floor.top, np.array(floor.xs), np.array(floor.ys), cells(floor))
+
+
+def _like(a: Slab, b: Slab) -> bool:
+    return abs(a.height - b.height) < SAME * max(a.height, b.height) + 0.05 and (
+        plan_difference(a, b) < SAME
+    )
+
+
+# --- stacks ---------------------------------------------------------------------------------------
+def _stacked(placed: Sequence[Placed]) -> list[tuple[int, int]]:
+    """Return the pairs (lower, upper) of blocks that stand on each other."""
+    pairs = []
+    for i, lower in enumerate(placed):
+        for j, upper in enumerate(placed):
+            a, b = lower.target, upper.target
+            if abs(a.z + a.height - b.z) < 1e-3 and _overlap(a, b):
+                pairs.append((i, j))
+    return pairs
+
+
+def _overlap(a: Block, b: Block) -> bool:
+    return (
+        min(a.x + a.width, b.x + b.width) - max(a.x, b.x) > TOUCH
+        and min(a.y + a.depth, b.y + b.depth) - max(a.y, b.y) > TOUCH
+    )
+
+
+def _native(own: Blocks, lower: Placed, upper: Placed) -> bool:
+    """Tell whether two blocks stand on each other as their sources do, up to scale."""
+    sources = {block.id: block for block in own.blocks}
+    a, b = sources[lower.source.id], sources[upper.source.id]
+    if abs(a.z + a.height - b.z) > 1e-3 * max(a.height, b.height) or not _overlap(a, b):
+        return False
+    return all(
+        np.allclose(_relation(lower.target, upper.target, k), _relation(a, b, k), atol=1e-3)
+        for k in (0, 1)
+    )
+
+
+def _relation(lower: Block, upper: Block, axis: int) -> tuple[float, float]:
+    """Return where an upper block begins and ends along an axis, as shares of the lower one."""
+    start, size = (lower.x, lower.width) if axis == 0 else (lower.y, lower.depth)
+    low, length = (upper.x, upper.width) if axis == 0 else (upper.y, upper.depth)
+    return (low - start) / size, (low + length - start) / size
+
+
+def _supported(sheet: StyleSheet, placed: list[Placed], pair: tuple[int, int]) -> None:
+    """Thin the lower block's walls where the upper one would reach over them (Fig. 11)."""
+    lower, upper = placed[pair[0]], placed[pair[1]]
+    maps = []
+    for axis, sides in ((0, ("left", "right")), (1, ("front", "back"))):
+        old, new = lower.maps[axis]
+        size = float(old[-1])
+        thickness = [_thickness(sheet, lower.source.id, side) for side in sides]
+        ends = [_outer(sheet, upper, axis, side) for side in sides]
+        low = _thinned(lower, axis, thickness[0], ends[0])
+        high = _thinned(lower, axis, (size - thickness[1][0], size - thickness[1][1]), ends[1])
+        knots = [*low, *high[::-1]]
+        places = [place for place, _ in knots]
+        inner = all(a < b for a, b in pairwise(places))
+        if knots and inner and places[0] > 0 and places[-1] < size:
+            old = np.array([old[0], *places, old[-1]])
+            new = np.array([new[0], *(value for _, value in knots), new[-1]])
+        maps.append((old, np.maximum.accumulate(new)))
+    placed[pair[0]] = replace(lower, maps=(maps[0], maps[1]))
+
+
+def _thickness(sheet: StyleSheet, block: str, side: str) -> tuple[float, float]:
+    wall = next(w for w in sheet.walls if w.block == block and w.side == side)
+    return wall.thickness.outer, wall.thickness.inner
+
+
+def _outer(sheet: StyleSheet, upper: Placed, axis: int, side: str) -> float:
+    """Return where the upper block's outer boundary on a side is (m, absolute)."""
+    outer = _thickness(sheet, upper.source.id, side)[0]
+    size = upper.source.size[axis]
+    place = outer if side in ("left", "front") else size - outer
+    return float(upper.moved(axis, np.array([place]))[0])
+
+
+def _thinned(
+    lower: Placed, axis: int, bounds: tuple[float, float], reach: float
+) -> list[tuple[float, float]]:
+    """Return knots of a wall's inner boundary where the upper wall lies within its thickness."""
+    outer, inner = lower.moved(axis, np.array(bounds)).tolist()
+    distance = reach - outer if bounds[1] > bounds[0] else outer - reach
+    thickness = abs(inner - outer)
+    if thickness < TOUCH or not 0 <= distance < thickness:
+        return []
+    sign = 1.0 if bounds[1] > bounds[0] else -1.0
+    knots = [(bounds[0], outer), (bounds[1], outer + sign * SUPPORT * distance)]
+    return [knot for knot in knots if 0 < knot[0] < float(lower.maps[axis][0][-1])]
+
+
+def _snapped(sheet: StyleSheet, lower: Placed, upper: Placed) -> Placed:
+    """Snap the vertical edges of an upper block to those of the block below, view by view."""
+    below, above = placed_slabs(sheet, lower), placed_slabs(sheet, upper)
+    if not below or not above:
+        return upper
+    maps = []
+    for axis in (0, 1):
+        old, new = upper.maps[axis]
+        places = _edges(sheet, upper, axis)
+        start, end = float(new[0]), float(new[-1])
+        goal = below[-1].xs if axis == 0 else below[-1].ys
+        goal = goal[(goal > start + TOUCH) & (goal < end - TOUCH)]
+        moved = snapped(upper.moved(axis, places), goal, end - start)
+        maps.append(
+            (
+                np.concatenate([old[:1], places, old[-1:]]),
+                np.concatenate([new[:1], moved, new[-1:]]),
+            )
+        )
+    return replace(upper, maps=(maps[0], maps[1]))
+
+
+def _edges(sheet: StyleSheet, placed: Placed, axis: int) -> Floats:
+    """Return all places of a block's vertical edges strictly between its ends (m, source)."""
+    lines = [
+        floor.xs if axis == 0 else floor.ys
+        for floor in sheet.floors
+        if floor.block == placed.source.id
+    ]
+    places = np.unique(np.concatenate([np.array(line) for line in lines]))
+    size = placed.source.size[axis]
+    return np.asarray(places[(places > TOUCH) & (places < size - TOUCH)])
+
+
+def face_corners(placed: Placed, storey: Storey, face: StyleFace, side: str) -> Floats:
+    """Return the corners (4, 3) of a face in the target: lower left, lower right, upper ones."""
+    axis = 0 if side in ("front", "back") else 1
+    corners = np.empty((4, 3))
+    start, end = placed.moved(axis, np.array([face.start, face.end])).tolist()
+    corners[:, axis] = [start, end, end, start]
+    corners[:, 1 - axis] = placed.moved(1 - axis, np.array([face.place]))[0]
+    corners[:, 2] = [storey.bottom, storey.bottom, storey.top, storey.top]
+    return corners

@@ -1,0 +1,137 @@
+"""Periods of textures: where windows repeat, and where a shop or an attic breaks the rhythm."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from ..geometry.arrays import Booleans, Floats
+
+PLACES, LINES = 1024, 24  # samples along and across the direction of repeat
+SURE = 0.45  # correlation at one period
+RISE = 0.15  # of the correlation between the dip before and the peak
+NEARLY = 0.85  # of the best peak: the shortest such period is taken
+SHORTEST = 0.6  # m
+AROUND = 8.0  # m: changes over longer distances are light, not rhythm
+WALL_SHARE = 0.25  # of a period that may be scaled
+BREAK = 0.35  # correlation with the storey beside, below which a row belongs to no rhythm
+
+
+def profile(picture: Floats, axis: int, size: float) -> Floats:
+    """Return a picture (h, w, 3) of `size` metres as samples (n, k) along the direction of repeat.
+
+    axis 0: along the columns, 1: along the rows from top to bottom. Each place's samples tell
+    what it looks like against the 8 metres around it.
+    """
+    turned = picture if axis == 0 else picture.transpose(1, 0, 2)
+    lines, places = turned.shape[:2]
+    shape = (min(places, PLACES), min(lines, LINES))
+    small = cv2.resize(turned.astype(np.float32), shape, interpolation=cv2.INTER_AREA)
+    samples = small.reshape(shape[1], shape[0], -1).transpose(1, 0, 2).reshape(shape[0], -1)
+    width = round(AROUND / size * shape[0])
+    if width >= shape[0]:
+        return np.asarray(samples - samples.mean(axis=0), dtype=np.float64)
+    around = cv2.blur(samples, (1, max(width, 1)), borderType=cv2.BORDER_REFLECT)
+    return np.asarray(samples - around, dtype=np.float64)
+
+
+def period(samples: Floats, size: float) -> float | None:
+    """Return the length (m) at which samples (n, k) over `size` metres repeat; None if they don't.
+
+    The shortest clear peak of the normalised autocorrelation, at most half of the size.
+    """
+    n = len(samples)
+    if n < 12 or samples.std() < 4 / 255:
+        return None
+    score = _autocorrelation(samples)
+    peaks = [
+        k
+        for k in range(max(2, int(SHORTEST / size * n)), n // 2 + 1)
+        if score[k] > score[k - 1] and score[k] >= score[k + 1]
+    ]
+    lowest = np.minimum.accumulate(score)
+    clear = [k for k in peaks if score[k] > SURE and score[k] - lowest[k] > RISE]
+    if not clear:
+        return None
+    best = max(score[k] for k in clear)
+    k = next(k for k in clear if score[k] >= NEARLY * best)
+    return _refined(score, k) * size / n
+
+
+def _autocorrelation(samples: Floats) -> Floats:
+    """Return the normalised correlation of samples with themselves shifted by 0 … n − 1 places."""
+    n = len(samples)
+    spectrum = np.fft.rfft(samples, 2 * n, axis=0)
+    product = np.fft.irfft((np.abs(spectrum) ** 2).sum(axis=1), 2 * n)[:n]
+    energy = np.concatenate([[0.0], np.cumsum((samples**2).sum(axis=1))])
+    left, right = energy[n - np.arange(n)], energy[n] - energy[np.arange(n)]
+    return np.asarray(product / np.maximum(np.sqrt(left * right), 1e-12))
+
+
+def _refined(score: Floats, k: int) -> float:
+    """Return the place of a peak between samples, by a parabola through three of them."""
+    a, b, c = score[k - 1 : k + 2]
+    bend = a - 2 * b + c
+    return k + (0.5 * (a - c) / bend if bend < -1e-12 else 0.0)
+
+
+def periodic_labels(signal: Floats, step: float) -> Booleans:
+    """Label places insertable in periods of `step` places, borders where the signal is low.
+
+    signal: (n,) variance signal. A quarter of each period, around its border, is scalable, and so
+    is what is left of a period at the ends.
+    """
+    n = len(signal)
+    half = 0.5 * WALL_SHARE * step
+    smooth = cv2.blur(signal.reshape(1, -1), (max(1, round(2 * half)), 1)).ravel()
+    phases = np.arange(0.0, step, max(step / 64, 0.25))
+    cost = [smooth[np.arange(p, n, step).astype(int)].mean() for p in phases]
+    first = phases[int(np.argmin(cost))]
+    place: Floats = np.mod(np.arange(n) + 0.5 - first, step).astype(np.float64)
+    labels: Booleans = np.minimum(place, step - place) > half
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], labels, [False]]))).reshape(-1, 2)
+    for start, end in edges:
+        if end - start < 0.6 * (1 - WALL_SHARE) * step:
+            labels[start:end] = False
+    return labels
+
+
+def breaks(samples: Floats, step: float) -> tuple[int, int]:
+    """Return the first and the last place (exclusive) of the rhythm with period `step` places.
+
+    From the middle outwards, a place belongs to the rhythm while it resembles the one a period
+    nearer to the middle; where it does not for a third of a period, the rhythm ends.
+    """
+    n, lag = len(samples), round(step)
+    like = _likeness(samples, lag)
+    width = max(1, round(0.25 * step))
+    like = cv2.blur(like.reshape(1, -1), (width, 1)).ravel()
+    alien = like < BREAK
+    long = max(2, round(step / 3))
+    middle = (n - lag) // 2
+    first = _last_run(alien[:middle][::-1], long)
+    last = _last_run(alien[middle:], long)
+    return (middle - first if first is not None else 0), (
+        middle + lag + last if last is not None else n
+    )
+
+
+def _likeness(samples: Floats, lag: int) -> Floats:
+    """Return the correlation of every place with the one `lag` further on (n − lag,)."""
+    a, b = samples[:-lag], samples[lag:]
+    product = (a * b).sum(axis=1)
+    size = np.sqrt((a**2).sum(axis=1) * (b**2).sum(axis=1))
+    floor = 0.25 * float((samples**2).sum(axis=1).mean())
+    difference = ((a - b) ** 2).sum(axis=1)
+    # places without contrast are alike when their difference is small
+    return np.asarray(np.where(difference < floor, 1.0, product / np.maximum(size, 1e-12)))
+
+
+def _last_run(alien: Booleans, long: int) -> int | None:
+    """Return where the first run of at least `long` alien places begins."""
+    count = 0
+    for place, odd in enumerate(alien):
+        count = count + 1 if odd else 0
+        if count == long:
+            return place - long + 1
+    return None

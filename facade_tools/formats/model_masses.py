@@ -18,14 +18,15 @@ from .surfaces_roofs import Plane, bodies, eaves_height, heights_at, roof_of, ro
 
 DETAIL_AREA = 6.0  # m²: a roof body smaller than this, above another one, is a dormer
 DETAIL_SHARE = 0.12  # of the footprint: likewise
-LEFT_OVER = 1.0  # m²: footprint without a roof above it that is worth a place
+LEFT_OVER = 0.1  # m²: footprint without a roof above it (below a window in it) that counts
 SAME_EAVES = 0.2  # metres: eaves nearer than this are level
 LOWEST = 1.6  # metres: lower masses are terraces and ramps
 CHIMNEY_SIDE = (0.2, 2.5)  # metres: least and largest width of a chimney
 CHIMNEY_AREA = 1.6  # m²: a larger one is a dormer
-CHIMNEY_RISE = 0.2  # metres above the highest roof around it
+CHIMNEY_RISE = 0.4  # metres above the highest roof around it
 DORMER_SIDE = (0.7, 12.0)  # metres: least and largest width of a dormer
 DORMER_RISE = 0.6  # metres above the roof at its lowest corner
+MOST_FACES = 40  # of a chimney: a railing or a vent has more
 MOST = 100  # chimneys, and dormers, of one building
 
 
@@ -170,7 +171,9 @@ def on_the_roof(
     bodies += [(tuple(p.surface for p in mass.planes), True) for mass in details]
     for surfaces, is_roof in bodies:
         low, high = bounds(surfaces)
-        chimney = _chimney(low, high, planes, ground)
+        chimney = None
+        if len(surfaces) <= MOST_FACES:
+            chimney = _chimney(low, high, planes, ground)
         if chimney is not None:
             stacks.append(chimney)
         elif _has_dormers_size(low, high) and (is_roof or _rises(low, high, planes)):

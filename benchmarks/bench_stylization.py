@@ -23,10 +23,10 @@ from facade_tools.formats.textured import Paint, TexturedMesh, joined
 from facade_tools.geometry.mesh import Material, Mesh, Scene
 from facade_tools.imaging.image_io import decoded
 from facade_tools.stylization.capture import capture_style
-from facade_tools.stylization.model import CaptureOptions
 from facade_tools.stylization.framing import standard_view, triangle_areas
-from facade_tools.stylization.projection import SIDES, _rasterise, palette
+from facade_tools.stylization.model import CaptureOptions
 from facade_tools.stylization.outline import wall_faces
+from facade_tools.stylization.projection import SIDES, _rasterise, palette
 from facade_tools.stylization.remesh import slabs
 from facade_tools.stylization.resizing import resized
 from facade_tools.stylization.retarget import Style, retarget

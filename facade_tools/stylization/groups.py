@@ -102,7 +102,7 @@ def group_rule(
     (a texture of noise) nothing is insertable; where they lump several periods of a texture that
     repeats into one section, the periods are the sections.
     """
-    mean = mean_picture(pictures)
+    mean = mean_picture(pictures, axis)
     signal = variance_signal(mean, axis)
     labels = insertable_labels(signal)
     place = size / len(labels)
@@ -120,7 +120,8 @@ def _telling(signal: Floats, labels: Booleans, mean: Floats, axis: int) -> bool:
     """Tell whether insertable places differ from scalable ones by more than noise does."""
     if not labels.any() or labels.all():
         return False
-    contrast = float(mean.var(axis=axis).mean(axis=-1).max()) ** 0.5
+    windows = mean[:, labels] if axis == 0 else mean[labels]
+    contrast = float(windows.var(axis=axis).mean(axis=-1).max()) ** 0.5
     low, high = float(signal[~labels].mean()), float(signal[labels].mean())
     return contrast > LEAST_CONTRAST and low < NOISE * high
 
@@ -130,17 +131,21 @@ def _longest_run(labels: Booleans) -> int:
     return int(np.diff(np.concatenate([[0], edges, [len(labels)]])).max())
 
 
-def mean_picture(pictures: Sequence[Picture]) -> Floats:
-    """Return the mean of pictures, all brought to the size of the largest, colours in 0..1."""
+def mean_picture(pictures: Sequence[Picture], axis: int) -> Floats:
+    """Return the mean of pictures, all brought to one size, colours in 0..1.
+
+    The size is the largest's, but at most 2048 pixels across a rule of `axis` and 256 along it.
+    """
     step = -(-len(pictures) // MAX_AVERAGED)
     chosen = pictures[::step]
-    height = max(picture.shape[0] for picture in chosen)
-    width = max(picture.shape[1] for picture in chosen)
+    most = (256, 2048) if axis == 0 else (2048, 256)
+    height, width = (min(max(p.shape[k] for p in chosen), most[k]) for k in (0, 1))
     total = np.zeros((height, width, 3), dtype=np.float32)
     for picture in chosen:
-        resized = cv2.resize(picture, (width, height), interpolation=cv2.INTER_LINEAR)
-        total += resized.reshape(height, width, 3)
-    return np.asarray(total, dtype=np.float64) / (255 * len(chosen))
+        shrinks = picture.shape[0] > height or picture.shape[1] > width
+        how = cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR
+        total += cv2.resize(picture, (width, height), interpolation=how).reshape(height, width, 3)
+    return np.asarray(total / (255 * len(chosen)), dtype=np.float32)
 
 
 def _median_run(labels: np.ndarray) -> float:

@@ -16,13 +16,14 @@ from .framing import Standard, standard_view
 from .outline import WallFace, faces_towards, wall_faces
 from .projection import face_pictures, texel_density, working_density
 from .remesh import Slab, on_grid, slabs, trimmed
-from .roles import SeenTier, Tier, broken_at, colours, tier_roles
+from .roles import SeenTier, Tier, broken_at, colours, odd_slabs, tier_roles
 from .structure import cuts
 from .wings import wing_slab, wings
 
 STOREY = 3.0  # m, to count the floors of a block
 TALL = 0.3  # of the height: a slab in which shops or an attic are looked for
 COARSE = 12.0  # pixels a metre, to look for them
+COARSEST = 3.0  # pixels a metre, to compare colours
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,22 +96,34 @@ def modelled(mesh: TexturedMesh, identity: str, options: CaptureOptions) -> Mode
 def _tiers(
     standard: Standard, found: list[Slab], options: CaptureOptions
 ) -> tuple[list[Slab], list[Tier]]:
-    """Cut slabs into tiers, at changes of the plan and where the textures' rhythm breaks.
+    """Cut slabs into tiers, at changes of the plan and where the textures change.
 
     Returns the slabs, of which up to two are cut in two, and the tiers.
     """
     starts = [0, *cuts([slab.area for slab in found])]
-    height = found[-1].top - found[0].bottom
-    tall = [i for i, slab in enumerate(found) if slab.height > TALL * height]
-    if not tall or not any(p.picture is not None for p in standard.mesh.paints):
+    if not any(p.picture is not None for p in standard.mesh.paints):
         return found, [Tier(start) for start in starts]
     wanted = options.bottom is None, options.top is None
+    heights = [slab.height for slab in found]
+    odd = odd_slabs(heights, starts, _looks(standard, found), wanted) if len(found) > 1 else set()
+    tall = [i for i, height in enumerate(heights) if height > TALL * sum(heights)]
     levels: dict[int, list[float]] = {}
-    for index, end in {(tall[0], 0), (tall[-1], 1)}:
+    for index, end in {(tall[0], 0), (tall[-1], 1)} if tall else set():
         level = _broken(standard, found[index], index, end) if wanted[end] else None
         if level is not None:
             levels.setdefault(index, []).append(level)
-    return _split(found, starts, levels)
+    return _split(found, starts, odd, levels)
+
+
+def _looks(standard: Standard, found: Sequence[Slab]) -> list[Floats]:
+    """Return the colours of every slab's walls as a histogram."""
+    faces = [wall_faces(slab, index) for index, slab in enumerate(found)]
+    pictures = face_pictures(standard.mesh, [face for own in faces for face in own], COARSEST)
+    seen = iter(pictures)
+    return [
+        colours([next(seen) for _ in own], [face.width * face.height for face in own])
+        for own in faces
+    ]
 
 
 def _broken(standard: Standard, slab: Slab, index: int, end: int) -> float | None:
@@ -124,13 +137,13 @@ def _broken(standard: Standard, slab: Slab, index: int, end: int) -> float | Non
 
 
 def _split(
-    found: Sequence[Slab], starts: Sequence[int], levels: dict[int, list[float]]
+    found: Sequence[Slab], starts: Sequence[int], odd: set[int], levels: dict[int, list[float]]
 ) -> tuple[list[Slab], list[Tier]]:
     slabs_: list[Slab] = []
     tiers: list[Tier] = []
     for index, slab in enumerate(found):
-        if index in starts:
-            tiers.append(Tier(len(slabs_)))
+        if index in starts or index in odd:
+            tiers.append(Tier(len(slabs_), broken=index in odd))
         inner = sorted(levels.get(index, ()))
         for k, (bottom, top) in enumerate(pairwise([slab.bottom, *inner, slab.top])):
             if k:

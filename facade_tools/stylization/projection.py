@@ -17,7 +17,7 @@ from .outline import WallFace
 
 MAX_SIDE = 4096  # pixels of one face
 MAX_PIXELS = 60_000_000  # of all faces together
-AMPLE_PIXELS = 12_000_000  # of all faces together, for more than the source's resolution
+AMPLE_PIXELS = 8_000_000  # of all faces together, for more than the source's resolution
 DEFAULT_DENSITY = 16.0  # pixels a metre where the source has no textures
 MAX_DENSITY = 256.0
 REACH = 0.06  # of the plan's size: how far off a face its texture may lie

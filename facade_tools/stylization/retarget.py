@@ -62,7 +62,9 @@ def retarget(style: Style, target: Blocks, small: float = SMALL) -> Scene:
 
 def _mean_colour(style: Style, found: Sequence[Panel]) -> str:
     names = dict.fromkeys(panel.texture for panel in found)
-    means = [style.pictures[name].mean(axis=(0, 1)) for name in names] or [np.full(3, 190.0)]
+    means = [style.pictures[name][::8, ::8].mean(axis=(0, 1)) for name in names] or [
+        np.full(3, 190.0)
+    ]
     r, g, b = np.round(np.mean(means, axis=0)).astype(int).tolist()
     return f"#{r:02x}{g:02x}{b:02x}"
 

@@ -20,6 +20,8 @@ LOW = 0.35  # of the height: a lowest or highest tier below this may be a bottom
 ALIKE = 0.8  # shared part of two colour histograms: the same facade goes on
 TALLEST_STOREY = 9.0  # m
 AGREED = 0.4  # of the wall area that shows a rhythm, for a break to count
+KINDRED = 0.6  # shared part of two histograms: slabs of one look
+LEAST_TIER = 0.03  # of the height
 BINS = 6
 
 
@@ -90,6 +92,35 @@ def colours(pictures: Sequence[Picture], areas: Sequence[float]) -> Floats:
         bins = (small.astype(np.int64) * BINS // 256) @ np.array([BINS * BINS, BINS, 1])
         total += area * np.bincount(bins, minlength=BINS**3) / len(bins)
     return np.asarray(total / max(float(total.sum()), 1e-12))
+
+
+def odd_slabs(
+    heights: Sequence[float],
+    starts: Sequence[int],
+    looks: Sequence[Floats],
+    wanted: tuple[bool, bool],
+) -> set[int]:
+    """Return the slabs at which a tier of another look begins, besides those in `starts`.
+
+    heights (m) and looks (histograms): of the slabs from the ground up. The lowest slabs of the
+    first tier and the highest of the last, where they look unlike the tier's usual look and are
+    low, become tiers of their own. wanted: whether to look below, and above.
+    """
+    whole = sum(heights)
+    ends = [*starts[1:], len(heights)]
+    found = set()
+    for end, (a, b) in enumerate(((starts[0], ends[0]), (starts[-1], ends[-1]))):
+        usual = np.average(looks[a:b], axis=0, weights=heights[a:b])
+        order = range(a, b) if end == 0 else range(b - 1, a - 1, -1)
+        height = 0.0
+        for slab in order:
+            alike = float(np.minimum(looks[slab], usual).sum()) > KINDRED
+            if alike or height + heights[slab] > LOW * whole:
+                if height > LEAST_TIER * whole and alike and wanted[end]:
+                    found.add(slab if end == 0 else slab + 1)
+                break
+            height += heights[slab]
+    return found
 
 
 def broken_at(faces: Sequence[WallFace], pictures: Sequence[Picture], end: int) -> float | None:

@@ -1,8 +1,10 @@
 from __future__ import annotations
 
+import io
 import itertools
 import json
 import struct
+import zlib
 
 import cv2
 import numpy as np
@@ -239,6 +241,31 @@ def test_sixteen_bits_grey_and_orientation_become_eight_bit_rgb_upright():
     assert decoded(with_orientation(jpeg(gradient()), 6), "x").shape == (60, 40, 3)
 
 
+def test_cmyk_becomes_rgb():
+    image = pytest.importorskip("PIL.Image")
+    picture = np.zeros((16, 32, 3), np.uint8)
+    picture[:, :16], picture[:, 16:] = (200, 40, 40), (40, 60, 200)
+    data = io.BytesIO()
+    image.fromarray(picture).convert("CMYK").save(data, "JPEG", quality=95)
+    found = decoded(data.getvalue(), "x").astype(int)
+    assert abs(found - picture)[:, [4, 28]].max() < 12
+
+
+@pytest.mark.parametrize("ending", [".tif", ".bmp", ".webp", ".png", ".jpg"])
+def test_every_format_is_read_whole_and_refused_in_part(ending):
+    data = cv2.imencode(ending, gradient())[1].tobytes()
+    assert decoded(data, "x").shape == (40, 60, 3)
+    for part in (data[: len(data) // 2], data[:-5], data[:30]):
+        with pytest.raises(InvalidInput, match=r"truncated|header|decoded"):
+            decoded(part, "x")
+
+
+def animated_png():
+    data, body = png(gradient()), b"acTL" + struct.pack(">II", 3, 0)
+    chunk = struct.pack(">I", 8) + body + struct.pack(">I", zlib.crc32(body))
+    return data[:33] + chunk + data[33:]
+
+
 def gif(frames):
     head = b"GIF89a" + struct.pack("<HH", 2, 2) + b"\xf0\0\0" + b"\0\0\0\xff\xff\xff"
     frame = (
@@ -265,6 +292,8 @@ def huge_png():
         (jpeg(gradient())[:-200], "truncated"),
         (huge_png(), "20000×20000"),
         (gif(3), "animated"),
+        (animated_png(), "animated"),
+        (cv2.imencodemulti(".tif", [gradient(), gradient()])[1].tobytes(), "several pages"),
         (b"RIFF\0\0\0\0WAVEfmt ", "no pixels|header"),
         (b"\xff\xd8\xff", "header"),
     ],

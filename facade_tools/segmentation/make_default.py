@@ -27,8 +27,8 @@ def rendered_pairs(count: int, seed: int) -> Iterator[Pair]:
         yield Pair(f"rendered-{number}", picture, labels)
 
 
-def make_default(count: int = 120, seed: int = 0) -> Classifier:
+def make_default(count: int = 150, seed: int = 0) -> Classifier:
     """Return the classifier trained on `count` rendered facades."""
     pairs = list(rendered_pairs(count, seed))
     rng: np.random.Generator = item_generator(seed, "default-classifier")
-    return train(pairs, TrainOptions(stages=2, pixels=800, augment=0), rng=rng)
+    return train(pairs, TrainOptions(pixels=800, augment=0), rng=rng)

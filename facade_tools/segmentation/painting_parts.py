@@ -225,11 +225,12 @@ def _balcony(canvas: Canvas, box: Box, style: Style, rng: np.random.Generator) -
     foot = style.px(style.slab)
     if style.slab > 1:
         part[-min(foot, max(1, len(part) // 4)) :] = style.trim * np.float32(rng.uniform(0.7, 1.1))
-    shadow = canvas[y1 : y1 + style.px(rng.uniform(0.5, 7)), x0:x1]
-    shadow *= np.float32(rng.uniform(0.45, 0.9))
-    if rng.random() < 0.5:
-        for x in range(0, shadow.shape[1], style.px(rng.uniform(8, 25))):
-            shadow[:, x : x + style.px(3)] *= np.float32(1.6)
+    shadow = canvas[y1 : y1 + style.px(rng.uniform(0.5, 9)), x0:x1]
+    shadow *= np.float32(rng.uniform(0.35, 0.9))
+    if rng.random() < 0.6:  # consoles
+        wide = rng.uniform(1.5, 5)
+        for x in range(0, shadow.shape[1], style.px(wide * rng.uniform(2, 6))):
+            shadow[:, x : x + style.px(wide)] *= np.float32(rng.uniform(1.2, 2.2))
 
 
 def _railing(part: Canvas, x0: int, style: Style, rng: np.random.Generator) -> None:
@@ -240,9 +241,11 @@ def _railing(part: Canvas, x0: int, style: Style, rng: np.random.Generator) -> N
     step = max(2, style.px(style.period))
     for k in range(max(1, step // 3)):
         part[:, (k - x0) % step :: step] *= np.float32(style.iron)
-    part[: style.px(1)] = style.rail
-    low = style.px(1.5)
-    part[-2 * low : -low] = style.rail
+    if rng.random() < 0.7:
+        part[: style.px(1)] = style.rail
+    if rng.random() < 0.7:
+        low = style.px(1.5)
+        part[-2 * low : -low] = style.rail
     if rng.random() < 0.08:  # flowers
         green = noise(shape, 2 * style.unit, rng)[:, :, 0] > 0.4
         part[green] = rng.uniform((0.1, 0.2, 0.05), (0.4, 0.5, 0.25))

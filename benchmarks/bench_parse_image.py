@@ -8,7 +8,6 @@ from __future__ import annotations
 import sys
 import time
 
-import cv2
 import numpy as np
 
 from facade_tools.grammar.library import builtin
@@ -33,8 +32,7 @@ def main():
     rows = []
     for number in range(count + 1):  # the first compiles
         rng = item_generator(1, "bench", number)
-        _, small, _ = render_facade(builtin("haussmann-floors"), 180, 315, rng=rng)
-        picture = cv2.resize(small, (400, 700), interpolation=cv2.INTER_CUBIC).astype(np.uint8)
+        _, picture, _ = render_facade(builtin("haussmann-floors"), 400, 700, rng=rng)
         working = classifier.working(picture)
         belief, seconds = timed(lambda w=working: classifier.probabilities(w))
         row = {"classifier": seconds}

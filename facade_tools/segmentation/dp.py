@@ -27,7 +27,7 @@ from .energy import (
 )
 from .refining import enlarged, refined
 
-STARTS = (0.0, 0.1, 0.3, 0.6)
+STARTS = (0.1, 0.6)
 MAX_ROUNDS = 30
 COARSE = (288, 600)  # rows and columns of a field that is solved as it is
 REACH = 3  # coarse pixels that a border may move on the fine field

@@ -57,8 +57,8 @@ class Maker:
         lots = [] if plot is None else [Lot(rings, height) for rings, height in plot.lots]
         rng = item_generator(self.seed, NAME, parse.id)
         ask = self.ask
-        if plot is not None and plot.roof is not None and ask.roof == "auto":
-            ask = replace(ask, roof=_known(plot.roof.style))
+        if plot is not None and plot.roof is not None:
+            ask = replace(ask, hint=_known(plot.roof.style))
         try:
             made = reconstruct(parse, photo.pixels, lots, ask, rng=rng)
             inputs = (item.provenance(), Source(photo.name, photo.sha256), *self.sources)

@@ -31,7 +31,8 @@ class Ask:
     """What the user says beside the parse.
 
     storey_height, height: metres (see elevation). depth: of the default footprint, metres. roof:
-    flat, gable, hip, mansard or auto. party: sides that are blind walls.
+    flat, gable, hip, mansard or auto. party: sides that are blind walls. hint: the roof that the
+    footprint tells of, for where the picture shows none.
     """
 
     storey_height: float | None = None
@@ -39,6 +40,7 @@ class Ask:
     depth: float = DEPTH
     roof: str = "auto"
     party: frozenset[str] = frozenset()
+    hint: str = "flat"
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +94,7 @@ def reconstruct(
     else:
         lots = [_rectangle(plan.width, ask.depth)]
     surfaces = surfaces_of(canvas_of(picture, labels, plan), plan, rng=rng)
-    design = Design(_roof(plan, ask.roof), surfaces.axes, ask.party, surfaces.colors)
+    design = Design(_roof(plan, ask), surfaces.axes, ask.party, surfaces.colors)
     specific = specific_grammar(plan, design, parse.id)
     derived = derive(specific.grammar, lots, rng=rng)
     return Reconstruction(parse.id, plan, specific, derived, surfaces)
@@ -131,12 +133,12 @@ def _front(lots: Iterable[Lot]) -> tuple[float, float | None]:
     return width, height
 
 
-def _roof(plan: Elevation, asked: str) -> str:
-    """Return the roof's style: what is asked for, or what the picture suggests."""
-    if asked != "auto":
-        return asked
+def _roof(plan: Elevation, ask: Ask) -> str:
+    """Return the roof's style: what is asked for, what the picture suggests, or the hint."""
+    if ask.roof != "auto":
+        return ask.roof
     if plan.loft <= 0:
-        return "flat"
+        return ask.hint
     return "mansard" if plan.dormers or plan.loft > 1.6 else "hip"
 
 

@@ -19,6 +19,7 @@ from .texture_synthesis import joined, median_color, quilted
 LARGEST = 2048  # pixels of a texture's longer side
 TILE = 256  # pixels of a synthesised tile
 TILE_METRES = 4.0  # metres that it covers
+LEAST_BLOCK = 36  # pixels of a patch
 MOST_AXES = 4
 SEAM = 0.12  # share of an axis' width in which its seam may run
 COLORS = {
@@ -90,9 +91,8 @@ def surfaces_of(canvas: Canvas, plan: Elevation, *, rng: np.random.Generator) ->
     for name, label in ((WALL, "wall"), (ROOF, "roof")):
         exemplars = list(_exemplars(clean, LABELS.index(label)))
         if exemplars:
-            block = max(8, min(TILE // 4, min(min(e.shape[:2]) for e in exemplars)))
-            density = TILE / TILE_METRES
-            scaled = [_resampled(e, density / canvas.scale[0]) for e in exemplars]
+            scaled = [_resampled(e, TILE / TILE_METRES / canvas.scale[0]) for e in exemplars]
+            block = int(np.clip(min(min(e.shape[:2]) for e in scaled), LEAST_BLOCK, TILE // 4))
             pictures[name] = quilted(scaled, (TILE, TILE), block, rng=rng)
     materials = {
         name: Material(name, "#ffffff", texture=encoded(picture, ".jpg"))

@@ -118,19 +118,25 @@ def strength(plane: Plane, blur: float) -> NDArray[np.float64]:
 def profiles(plane: Plane) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return a profile of rows and one of columns whose product explains the plane best.
 
-    Rows are scaled to about equal length before, so that shade counts as much as sun. The rows'
-    profile is a correlation, −1..1; the columns' has length 1; both are positive at windows.
+    Rows, then columns, are scaled to about equal length before, so that shade counts as much as
+    sun and a neighbour's edge no more than a window. The rows' profile is a correlation, −1..1;
+    the columns' has length 1; both are positive at windows.
     """
     table = plane.astype(np.float64)
-    length = np.sqrt((table**2).sum(axis=1))
-    typical = float(np.median(length))
-    rows = table / (length + 0.5 * typical + 1e-9)[:, None]
+    rows = table / (_lengths(table, 1, 0.5) + 1e-9)
+    rows = rows / (_lengths(rows, 0, 0.3) + 1e-9)
     across = _leading(rows)
     for _ in range(ROUNDS):  # a row cannot hold the opposite of windows
         down = np.maximum(rows @ across, 0.0)
         across = down @ rows
         across /= np.linalg.norm(across) + 1e-12
     return rows @ across, across
+
+
+def _lengths(table: NDArray[np.float64], axis: int, floor: float) -> NDArray[np.float64]:
+    """Return the lengths of rows (axis 1) or columns (0), and `floor` of the median one more."""
+    length = np.sqrt((table**2).sum(axis=axis, keepdims=True))
+    return np.asarray(length + floor * float(np.median(length)))
 
 
 def _leading(rows: NDArray[np.float64]) -> NDArray[np.float64]:

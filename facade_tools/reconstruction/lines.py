@@ -55,16 +55,17 @@ def _palette(colors: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[
     return centres.astype(np.float32), index
 
 
-def differences(found: Segments, reach: int) -> NDArray[np.float64]:
+def differences(found: Segments, reach: int, top: int = 0) -> NDArray[np.float64]:
     """Return how different the `reach` rows above and below every row's upper border are.
 
-    (rows + 1,), CIELAB units (eq. 9, of two consecutive regions); 0 at the picture's borders.
+    (rows + 1,), CIELAB units (eq. 9, of two consecutive regions); 0 at the picture's borders and
+    down to `top`, above which nothing is looked at.
     """
     counts = found.counts
     rows = len(counts) - 1
     out = np.zeros(rows + 1)
-    for row in range(1, rows):
-        above = counts[row] - counts[max(0, row - reach)]
+    for row in range(top + 1, rows):
+        above = counts[row] - counts[max(top, row - reach)]
         below = counts[min(rows, row + reach)] - counts[row]
         out[row] = earth_movers(above, below, found.palette)
     return out

@@ -22,7 +22,7 @@ from .evidence import Evidence, agreement, profiles, window_evidence
 from .lines import differences, segments
 from .potentials import CELL
 from .storeys import STOREY, Band, Facade, period, skyline, storeys
-from .stripes import Span, spans, stripes
+from .stripes import Span, roof_spans, spans, stripes
 
 ROWS, PIXELS = 320, 160_000  # the working picture
 MOST = 1500  # cells a side
@@ -94,9 +94,10 @@ def in_cells(
     working = fitted(photo.pixels, ROWS, PIXELS)
     evidence = window_evidence(working, _shrunk(mask, working.shape[:2]))
     height = len(working)
-    colour = differences(segments(working, evidence.seen), max(2, int(REACH * height)))
+    found, reach = segments(working, evidence.seen), max(2, int(REACH * height))
     rows = agreement(evidence.plane, profiles(evidence.plane)[1], 3.0)
-    sky = skyline(colour, rows)
+    sky = skyline(differences(found, reach), rows)
+    colour = differences(found, reach, sky)
     cell = _cell(scale, rows[sky:], height - sky)
     return _facade(working, evidence, colour, sky, cell)
 
@@ -160,7 +161,11 @@ def _tree(facade: Facade, bands: list[Band], columns: list[Span], shape: tuple[i
     """Return the derivation: up into ground floor, floors, roof and sky; right into windows."""
     at = _pixels(facade, shape)
     height, width = facade.plane.shape
-    children = [_storey(band, columns, width, at) for band in bands]
+    children = []
+    for band in bands:
+        own = band.kind == "roof" and band.high > band.low
+        stripes_ = roof_spans(facade, band, bands) if own else columns
+        children.append(_storey(band, stripes_, width, at))
     if facade.sky > 0:
         children.append(Node("Sky", at.box(0, 0, width, facade.sky), label="sky"))
     return Node("Fc", at.box(0, 0, width, height), "up", None, tuple(children))

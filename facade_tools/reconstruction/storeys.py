@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import Infeasible
-from ..geometry.arrays import Floats
+from ..geometry.arrays import Floats, Integers
 from .chains import Chain, ChainProblem, solve
 from .evidence import agreement, along_columns, profiles, strength
 from .potentials import (
@@ -26,25 +27,27 @@ GROUND = (24, 60)  # cells: sizes of the ground floor, 2.4 to 6 m
 FLOOR = (24, 42)  # of the other floors, 2.4 to 4.2 m
 ROOF = 60  # cells: the highest roof
 STOREY = 3.0  # m: what a storey measures where nobody says
-LEAST_BAND = 5  # cells: lower windows are none
+LEAST_BAND = 3  # cells: lower windows are none
+HALF = 8  # cells: the least part of a roof
+SECOND = 2.0  # cost of a second row of windows in a roof
 
 PEAK = 0.45  # a peak of the autocorrelation counts from this share of the highest
-SKY = 15.0  # CIELAB units between the sky and a building
+SKY = 8.0  # CIELAB units between the sky and a building
 BUSY = 2.0  # how much windows above a line speak against its being the skyline
-UPPER = 0.3  # share of the building where roofs may be, and columns of their own
-OWN_ABOVE, OWN = 0.6, 0.4  # weights of what a row holds beside its agreement with the columns
-MEAN = 15.0  # cells: standard deviation of the local mean that is taken off
-WEIGHTS = Weights(alpha=4.0, beta=0.3, boundary=0.05, content=1.0)
+UPPER = 0.4  # share of the building where roofs may be, and columns of their own
+OWN_ABOVE, OWN = 0.5, 0.2  # weights of what a row holds beside its agreement with the columns
+MEAN = 12.0  # cells: standard deviation of the local mean that is taken off
+WEIGHTS = Weights(alpha=6.0, beta=0.1, boundary=0.3, content=1.0)
 EMPTY = 0.75  # cost of a floor without a row of windows
-LINE = 0.3 / 40  # per CIELAB unit: what a difference in colour says for a building line
+LINE = 0.1  # per CIELAB unit: what a difference in colour says for a building line
 
 
 @dataclass(frozen=True, slots=True)
 class Band:
     """Rows of cells y0 to y1 (from the top) of a storey, and those of its windows (low, high).
 
-    kind: ground, floor or roof. score: mean evidence of the windows' rows. Without windows low =
-    high.
+    kind: ground, floor or roof. columns, evidence: means of the profiles over the windows' rows.
+    Without windows low = high.
     """
 
     kind: str
@@ -52,7 +55,8 @@ class Band:
     y1: int
     low: int
     high: int
-    score: float
+    columns: float
+    evidence: float
 
 
 def period(rows: Floats) -> float:
@@ -143,60 +147,84 @@ def storeys(facade: Facade) -> tuple[list[Band], float]:
     up = facade.picture[facade.sky :][::-1]
     evidence = np.ascontiguousarray(rows.evidence[::-1])
     n = len(up)
-    contents = band_contents(evidence, ROOF)
+    contents = band_contents(evidence, GROUND[1])
     unary = (
         labels(n, GROUND, FLOOR)
-        + WEIGHTS.boundary * boundary_costs(boundary_strength(up), ROOF)
+        + WEIGHTS.boundary * boundary_costs(boundary_strength(up), GROUND[1])
         - WEIGHTS.content * contents
         + np.where(contents < EMPTY, EMPTY, 0.0)
     )
     sums = diagonal_sums(line_differences(up))
-    ends = _roof_costs(evidence, facade.differences[facade.sky :][::-1])
+    roofs = _roofs(contents)
+    ends = _roof_costs(roofs, facade.differences[facade.sky :][::-1])
     problem = ChainProblem(sums, unary, np.zeros((n + 1, 1)), WEIGHTS, ends, grounded=True)
     chain = solve(problem)
-    return _bands(chain, evidence, rows.columns[::-1], len(facade.plane)), chain.energy
+    edges = _edges(chain, roofs)
+    return _bands(edges, evidence, rows.columns[::-1], len(facade.plane)), chain.energy
 
 
-def _roof_costs(evidence: Floats, differences: Floats) -> Floats:
-    """Return what the roof costs for every building line (n+1,), lines from the ground."""
-    n = len(evidence)
-    costs = np.full(n + 1, np.inf)
+@dataclass(frozen=True, slots=True)
+class _Roofs:
+    """For every building line (n+1,): what the best roof above it explains, and where it is cut.
+
+    A roof has one row of windows, or two: a set-back floor under an attic.
+    """
+
+    gain: Floats
+    cut: Integers
+
+
+def _roofs(contents: Floats) -> _Roofs:
+    n = len(contents) - 1
+    gain, cut = np.full(n + 1, -np.inf), np.full(n + 1, n)
     for line in range(max(1, n - ROOF), n + 1):
-        low, high = _roof_band(evidence[line:])
-        inside = evidence[line:]
-        left = np.maximum(inside, 0).sum() - np.maximum(inside[low:high], 0).sum()
-        gain = inside[low:high].sum() - left
-        colour = LINE * differences[line] if n - line >= 8 else 0.0
-        costs[line] = -WEIGHTS.content * gain - colour
+        gain[line] = contents[line, n - line]
+        for at in range(line + HALF, n - HALF + 1):
+            both = contents[line, at - line] + contents[at, n - at] - SECOND
+            if both > gain[line]:
+                gain[line], cut[line] = both, at
+    return _Roofs(gain, cut)
+
+
+def _roof_costs(roofs: _Roofs, differences: Floats) -> Floats:
+    """Return what the roof costs for every building line (n+1,), lines from the ground."""
+    n = len(roofs.gain) - 1
+    high = n - np.arange(n + 1) >= HALF
+    costs: Floats = -WEIGHTS.content * roofs.gain - np.where(high, LINE * differences, 0.0)
     return costs
 
 
-def _roof_band(evidence: Floats) -> tuple[int, int]:
-    low, high = best_band(np.ascontiguousarray(evidence))
-    return (low, high) if high - low >= LEAST_BAND else (0, 0)
+def _edges(chain: Chain, roofs: _Roofs) -> list[tuple[str, int, int]]:
+    """Return kind, first and last line of the storeys from the ground."""
+    out = [
+        ("floor" if start else "ground", start, start + size)
+        for start, size in zip(chain.starts, chain.sizes, strict=True)
+    ]
+    line, n = out[-1][2], len(roofs.gain) - 1
+    cuts = [line, int(roofs.cut[line]), n] if roofs.cut[line] < n else [line, n]
+    return out + [("roof", low, high) for low, high in pairwise(cuts) if high > low]
 
 
-def _bands(chain: Chain, evidence: Floats, columns: Floats, height: int) -> list[Band]:
+def _bands(
+    edges: list[tuple[str, int, int]], evidence: Floats, columns: Floats, height: int
+) -> list[Band]:
     """Return floors and roof from the ground, in rows from the top."""
-    edges = [(start, start + size) for start, size in zip(chain.starts, chain.sizes, strict=True)]
-    kinds = ["ground"] + ["floor"] * (len(edges) - 1)
-    line = edges[-1][1]
-    if line < len(evidence):
-        edges.append((line, len(evidence)))
-        kinds.append("roof")
     out = []
-    for kind, (start, stop) in zip(kinds, edges, strict=True):
-        find = _roof_band if kind == "roof" else best_band
-        low, high = find(np.ascontiguousarray(evidence[start:stop]))
-        profile = columns if kind == "ground" else evidence + columns
-        score = float(profile[start + low : start + high].mean()) if high > low else 0.0
+    for kind, start, stop in edges:
+        low, high = best_band(np.ascontiguousarray(evidence[start:stop]))
+        if high - low < LEAST_BAND:
+            low = high = 0
+        rows = slice(start + low, start + high)
+        scores = [float(p[rows].mean()) if high > low else 0.0 for p in (columns, evidence)]
         place = (height - stop, height - start, height - start - high, height - start - low)
-        out.append(Band(kind, *place, score))
+        out.append(Band(kind, *place, *scores))
     return _kept(out)
 
 
-GROUND_SCORE, FLOOR_SCORE = 0.8, 0.15  # of the median floor's: what a row of windows must reach
-GROUND_HEIGHT, FLOOR_HEIGHT = 0.5, 0.25
+# What a row of windows must reach: shares of the median floor's agreement with the columns (of a
+# roof: of its evidence) and of its height.
+LEAST_SCORE = {"ground": 0.7, "floor": 0.15, "roof": 0.2}
+LEAST_HEIGHT = {"ground": 0.5, "floor": 0.25, "roof": 0.2}
 
 
 def _kept(bands: list[Band]) -> list[Band]:
@@ -204,20 +232,19 @@ def _kept(bands: list[Band]) -> list[Band]:
     floors = [band for band in bands if band.kind == "floor" and band.high > band.low]
     if not floors:
         return bands
-    score = float(np.median([band.score for band in floors]))
+    usual = {kind: float(np.median([_score(b, kind) for b in floors])) for kind in LEAST_SCORE}
     height = float(np.median([band.high - band.low for band in floors]))
     out = []
     for band in bands:
-        ground = band.kind == "ground"
-        enough = band.score >= (GROUND_SCORE if ground else FLOOR_SCORE) * score
-        high = band.high - band.low >= (GROUND_HEIGHT if ground else FLOOR_HEIGHT) * height
+        kind = band.kind
+        enough = _score(band, kind) >= LEAST_SCORE[kind] * usual[kind]
+        high = band.high - band.low >= LEAST_HEIGHT[kind] * height
         out.append(band if enough and high else replace(band, low=band.y1, high=band.y1))
     return out
 
 
-def lowest_height() -> int:
-    """Return the cells that a facade has at least."""
-    return GROUND[0]
+def _score(band: Band, kind: str) -> float:
+    return band.evidence if kind == "roof" else band.columns
 
 
 def refuse_small(cells: tuple[int, int]) -> None:

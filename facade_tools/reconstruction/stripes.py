@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import Infeasible
+from ..geometry.arrays import Floats
 from .chains import Chain, ChainProblem, solve
-from .evidence import profiles
+from .evidence import along_columns, profiles
 from .potentials import (
     Weights,
     boundary_costs,
@@ -27,6 +28,7 @@ GAP = 60  # cells: the widest wall between two stripes
 WEIGHTS = Weights(alpha=3.0, beta=0.4, boundary=0.05, gap=0.03, content=0.2)
 COST = 0.25  # of a stripe
 CELL_SHARE = 0.4  # of the usual evidence: from here a cell holds a window
+ROOF_BLUR = 2.0  # cells: a dormer's frame and its pane are one
 ROW_SHARE = 0.5  # of the rows: from here a stripe is one
 
 Span = tuple[int, int]
@@ -38,9 +40,13 @@ def stripes(facade: Facade, *, gaps: bool = True) -> Chain:
     gaps: with the term of walls between windows (homogeneous and symmetric); it can be switched
     off. A facade without any has an empty chain.
     """
-    side = np.ascontiguousarray(facade.picture[facade.sky :].transpose(1, 0, 2))
     across = profiles(facade.plane[facade.sky :])[1]
     evidence = across / (np.percentile(across, 95) + 1e-9)
+    return _chain(facade.picture[facade.sky :], evidence, gaps=gaps)
+
+
+def _chain(picture: Floats, evidence: Floats, *, gaps: bool) -> Chain:
+    side = np.ascontiguousarray(picture.transpose(1, 0, 2))
     n = len(side)
     widest = STRIPE[1]
     unary = (
@@ -56,6 +62,17 @@ def stripes(facade: Facade, *, gaps: bool = True) -> Chain:
         return solve(ChainProblem(sums, unary, table, WEIGHTS, ends, grounded=False))
     except Infeasible:
         return Chain((), (), 0.0)
+
+
+def roof_spans(facade: Facade, roof: Band, bands: Sequence[Band]) -> list[Span]:
+    """Return the windows of a roof, which need not stand in the columns below it."""
+    floors = [band for band in bands if band.kind == "floor" and band.high > band.low]
+    across = [facade.plane[b.low : b.high].mean(axis=0) for b in floors or [roof]]
+    usual = float(np.median([np.percentile(row, 90) for row in across]))
+    own = facade.plane[roof.low : roof.high].mean(axis=0).astype(np.float64)
+    evidence = along_columns(own, ROOF_BLUR) / (usual + 1e-9)
+    chain = _chain(facade.picture[roof.low : roof.high], evidence, gaps=False)
+    return [(start, start + size) for start, size in zip(chain.starts, chain.sizes, strict=True)]
 
 
 def spans(chain: Chain, bands: Sequence[Band], plane: NDArray[np.float32]) -> list[Span]:

@@ -24,6 +24,7 @@ from facade_tools.imaging.image_io import MAX_PIXELS, decoded, read_photo
 from facade_tools.segmentation import dp, walk
 from facade_tools.segmentation.deriving import Frame, derivation, floors_of, regions_of
 from facade_tools.segmentation.energy import Layout, column_costs, energy, field_of, state_costs
+from facade_tools.segmentation.painting import render_facade
 from facade_tools.segmentation.random_parse import in_pixels
 
 CLASSES = LABELS[1:]
@@ -122,6 +123,11 @@ def rendered_labels(name, seed, width=180, height=240):
     tree = sample_derivation(builtin(name), width, height, rng=np.random.default_rng(seed))
     turned = in_pixels(tree, height)
     return turned, painted(turned, (height, width), label_index())
+
+
+def rendered_picture(width, height):
+    rng = np.random.default_rng(0)
+    return render_facade(builtin("haussmann"), width, height, rng=rng)[1]
 
 
 def solved(name, belief):
@@ -357,20 +363,21 @@ def test_a_bad_picture_stops_or_is_skipped(facade, photos, tmp_path):
     assert facade("parse-image", tiny, "--grammar", "tskp10").returncode == 4
 
 
-def test_a_rectified_photograph_keeps_its_name_and_homography(facade, tmp_path):
-    photo = "sample_data/photos/at-an-angle.jpg"
-    straight, report = tmp_path / "straight.png", tmp_path / "report.json"
-    facade("rectify", photo, "-o", straight, "--report", report)
-    by_hand = json.loads(facade("parse-image", straight).stdout)
-    for asked in ("auto", report):
-        done = facade("parse-image", photo, "--rectify", asked)
+def test_a_rectified_photograph_keeps_its_name_and_homography(facade_here, tmp_path):
+    photo, straight, report = (tmp_path / name for name in ("a.png", "b.png", "report.json"))
+    corners = "8,12 100,4 96,140 12,128"
+    photo.write_bytes(png(rendered_picture(112, 144)))
+    facade_here("rectify", photo, "--corners", corners, "-o", straight, "--report", report)
+    by_hand = json.loads(facade_here("parse-image", straight).stdout)
+    for asked in (corners, report):
+        done = facade_here("parse-image", photo, "--rectify", asked)
         assert done.returncode == 0, done.stderr
         parse = json.loads(done.stdout)
-        assert parse["image"]["name"] == "at-an-angle.jpg"
+        assert parse["image"]["name"] == "a.png"
         assert parse["image"]["size"] == by_hand["image"]["size"]
         assert parse["regions"] == by_hand["regions"]
         wanted = json.loads(report.read_text())["homography"]
         np.testing.assert_allclose(parse["rectification"], wanted)
-    other = facade("parse-image", straight, "--rectify", report)
+    other = facade_here("parse-image", straight, "--rectify", report)
     assert other.returncode == 3
     assert b"another picture" in other.stderr

@@ -16,7 +16,7 @@ import warnings
 from pathlib import Path
 
 import numpy as np
-from peers_density import columns, fit_products
+from peers_density import columns, fit_independent, fit_products, fit_stepmix, has_stepmix
 
 from facade_tools.artifacts.attributes import Attributes
 from facade_tools.artifacts.store import read
@@ -27,15 +27,18 @@ from facade_tools.exteriors.layout import building_layout
 from facade_tools.exteriors.learning import LearnOptions, boundary_of, learn_model
 from facade_tools.exteriors.prior import shipped_prior
 
-MODELS = ("full", "no-lateral", "no-middle", "flat", "gmm", "faithful", "products")
+MODELS = ("full", "no-lateral", "no-middle", "flat", "gmm", "faithful")
+PEERS = {
+    "products": lambda c: fit_products(c, np.random.default_rng(0)),
+    "StepMix": fit_stepmix,
+    "independent": fit_independent,
+}
 
 
 def held_out(name: str, train: list[Attributes], test: list[Attributes]) -> np.ndarray:
-    if name == "products":
+    if name in PEERS:
         layout = building_layout(boundary_of(train))
-        fit = fit_products(
-            columns(read_attributes(train, layout), layout), np.random.default_rng(0)
-        )
+        fit = PEERS[name](columns(read_attributes(train, layout), layout))
         return fit.nll(columns(read_attributes(test, layout), layout))
     faithful = name == "faithful"
     options = LearnOptions("full" if faithful else name, faithful)
@@ -90,15 +93,16 @@ def main() -> None:
     parser.add_argument("--attributes", type=Path)
     parser.add_argument("--splits", type=int, default=3)
     parser.add_argument("--train", type=int)
-    parser.add_argument("--models", default=",".join(MODELS))
+    parser.add_argument("--models", default=",".join((*MODELS, *PEERS)))
     parser.add_argument("--sizes", default="200,2000")
     options = parser.parse_args()
     warnings.simplefilter("ignore")
+    names = [n for n in options.models.split(",") if n != "StepMix" or has_stepmix()]
     given = options.attributes
     rows = shipped_prior() if given is None else list(read([str(given)], "attributes"))
     learn_model(rows[:60], rng=np.random.default_rng(0), options=LearnOptions(largest=2))  # compile
     if options.splits:
-        compare(rows, options.splits, options.train, options.models.split(","))
+        compare(rows, options.splits, options.train, names)
     if options.sizes:
         speed(rows, [int(size) for size in options.sizes.split(",")])
 

@@ -1,12 +1,15 @@
 """Peers that have a density, fitted on the same coordinates and judged by the same measure.
 
 The mixture of products is what StepMix fits (independent coordinates within a class, EM, BIC),
-with the atoms of the contract as categories; `stepmix_nll` runs StepMix itself.
+with the atoms of the contract as categories; `fit_stepmix` runs StepMix itself, where it is
+installed (pip install stepmix; no dependency of the project). Whatever fits, the standard
+deviations are held at the contract's floors.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib.util import find_spec
 
 import numpy as np
 
@@ -126,3 +129,99 @@ def _em(c: Columns, k: int, rng: np.random.Generator) -> tuple[Products, float]:
             break
         last = nll
     return fit, nll
+
+
+# --- StepMix itself -----------------------------------------------------------------------------
+
+
+def has_stepmix() -> bool:
+    return find_spec("stepmix") is not None
+
+
+def fit_stepmix(c: Columns, largest: int = 16, starts: int = 3) -> Products:
+    """Run StepMix (mixed measurement with missing values), the number of classes by its BIC.
+
+    Columns that nobody observes are left out and put back as they came. A category that a class
+    never shows gets half a row, since −inf would end the comparison.
+    """
+    from stepmix.stepmix import StepMix
+
+    cats = np.stack(c.states, axis=1).astype(float)
+    cats[cats < 0] = np.nan
+    wide = np.flatnonzero((~np.isnan(c.x)).any(axis=0))
+    flags = np.flatnonzero((~np.isnan(cats)).any(axis=0))
+    rows = np.concatenate([c.x[:, wide], cats[:, flags]], axis=1)
+    kinds = {
+        "cont": {"model": "gaussian_diag_nan", "n_columns": len(wide)},
+        "cat": {"model": "categorical_nan", "n_columns": len(flags)},
+    }
+    best, best_bic, worse = None, np.inf, 0
+    for k in range(1, largest + 1):
+        model = StepMix(
+            k, measurement=kinds, n_init=starts, random_state=0, progress_bar=0, max_iter=200,
+            abs_tol=1e-4,
+        ).fit(rows)  # fmt: skip
+        bic = model.bic(rows)
+        worse = 0 if bic < best_bic else worse + 1
+        if bic < best_bic:
+            best, best_bic = model, bic
+        if worse >= 3:
+            break
+    return _from_stepmix(c, best.get_parameters(), wide, flags)
+
+
+def _from_stepmix(c: Columns, found: dict, wide: np.ndarray, flags: np.ndarray) -> Products:
+    weights = np.asarray(found["weights"])
+    k, d = len(weights), c.x.shape[1]
+    mean, sd = np.zeros((k, d)), np.tile(c.floor, (k, 1))
+    mean[:, wide] = np.nan_to_num(found["measurement"]["cont"]["means"])
+    spread = np.sqrt(np.nan_to_num(found["measurement"]["cont"]["covariances"]))
+    sd[:, wide] = np.maximum(spread, c.floor[wide])
+    tables = [np.full((k, m), 1 / m) for m in c.sizes]
+    most = found["measurement"]["cat"]["max_n_outcomes"]
+    pis = np.nan_to_num(np.asarray(found["measurement"]["cat"]["pis"])).reshape(k, -1, most)
+    for at, j in enumerate(flags):
+        table = pis[:, at, : c.sizes[j]]
+        table = np.pad(table, ((0, 0), (0, c.sizes[j] - table.shape[1]))) + 0.5 / len(c.x)
+        tables[j] = table / table.sum(axis=1, keepdims=True)
+    return Products(weights, mean, sd, tables)
+
+
+# --- the others ---------------------------------------------------------------------------------
+
+
+def fit_independent(c: Columns) -> Products:
+    """Independent columns."""
+    return m_step(c, np.ones((len(c.x), 1)))
+
+
+def gaussian_mixture_nll(
+    train: Columns, test: Columns, kind: str, largest: int = 10
+) -> tuple[np.ndarray, int]:
+    """Return −log P (n,) of scikit-learn's mixture (BIC) of complete continuous columns.
+
+    Categories are independent of it and of each other.
+    """
+    from sklearn.mixture import GaussianMixture
+
+    fits = [
+        GaussianMixture(k, covariance_type=kind, n_init=3, random_state=0, reg_covar=1e-3).fit(
+            train.x
+        )
+        for k in range(1, largest + 1)
+    ]
+    best = min(fits, key=lambda fit: fit.bic(train.x))
+    alone = fit_independent(train)
+    blank = Columns(np.full_like(test.x, np.nan), test.floor, test.states, test.sizes)
+    return alone.nll(blank) - best.score_samples(test.x), best.n_components
+
+
+def draw_products(fit: Products, c: Columns, n: int, rng: np.random.Generator) -> Columns:
+    """Return n rows drawn from a mixture of products."""
+    k = rng.choice(len(fit.weights), n, p=fit.weights / fit.weights.sum())
+    x = fit.mean[k] + fit.sd[k] * rng.standard_normal((n, c.x.shape[1]))
+    states = [
+        (rng.random((n, 1)) > np.cumsum(t[k], axis=1)).sum(axis=1).clip(0, t.shape[1] - 1)
+        for t in fit.tables
+    ]
+    return Columns(x, c.floor, states, c.sizes)

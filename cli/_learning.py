@@ -9,8 +9,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from facade_tools.artifacts.documents import encode
-from facade_tools.artifacts.numbers import dump_line
 from facade_tools.artifacts.provenance import Provenance, Source
 from facade_tools.artifacts.store import RawItem, digest, read_one, read_raw
 from facade_tools.errors import InvalidInput
@@ -111,6 +109,7 @@ class Drawing:
     style: int | None
     top: bool
     min_distance: float
+    smooth: bool
 
     def runs(self, count: int) -> list[tuple[int, int]]:
         """Return first index and number of the runs; what looks at all samples is one run."""
@@ -120,18 +119,23 @@ class Drawing:
 
     def __call__(self, run: tuple[int, int]) -> list[tuple[str, bytes]]:
         """Return id and bytes of every sample of a run."""
-        from facade_tools.exteriors.drawing import SampleOptions, sample_attributes
+        from facade_tools.exteriors.drawing import SampleOptions
+        from facade_tools.exteriors.sample_lines import sample_lines
         from facade_tools.randomness import item_generator
 
         start, count = run
-        rng = item_generator(self.seed, "sample", start)
-        options = SampleOptions(self.style, self.top, self.min_distance)
-        rows = sample_attributes(self.model, count, rng=rng, given=self.given, options=options)
-        return [self._written(row, start + i) for i, row in enumerate(rows)]
-
-    def _written(self, row: Attributes, index: int) -> tuple[str, bytes]:
-        named = replace(row, id=f"{self.seed}-{index}", provenance=self.provenance)
-        return named.id, dump_line(encode(named))
+        options = SampleOptions(
+            self.style, self.top, self.min_distance, str(self.seed), start, smooth=self.smooth
+        )
+        rows = sample_lines(
+            self.model,
+            count,
+            rng=item_generator(self.seed, "sample", start),
+            given=self.given,
+            options=options,
+            provenance=self.provenance,
+        )
+        return list(rows)
 
 
 def write_samples(

@@ -22,6 +22,9 @@ from . import _options
     help="Root mean square distance, in standard deviations a coordinate, that samples keep from "
     "training buildings and from each other.",
 )
+@click.option(
+    "--smooth", is_flag=True, help="Do not take up again the exact values that buildings share."
+)
 @_options.output
 @_options.seed
 @_options.jobs
@@ -33,6 +36,7 @@ def command(
     style: int | None,
     top: bool,
     min_distance: float,
+    smooth: bool,
     output: str | None,
     seed: int,
     jobs: int,
@@ -51,7 +55,7 @@ def command(
 
     loaded, source = load_model(model)
     known, sources = read_given(given)
-    recorded = {"style": style, "top": top, "min_distance": min_distance}
+    recorded = {"style": style, "top": top, "min_distance": min_distance, "smooth": smooth}
     provenance = Provenance("sample", seed, recorded, (source, *sources))
-    drawing = Drawing(loaded, known, provenance, seed, style, top, min_distance)
+    drawing = Drawing(loaded, known, provenance, seed, style, top, min_distance, smooth)
     write_samples(drawing, count, output, jobs=jobs, scheduler=scheduler)

@@ -17,7 +17,7 @@ from facade_tools.exteriors.coordinates import read_attributes, write_attributes
 from facade_tools.exteriors.dataset import build, fit_scaling
 from facade_tools.exteriors.density import log_density
 from facade_tools.exteriors.evaluation import negative_log_density
-from facade_tools.exteriors.groups import GROUPS, Coordinate, Group, Reading, read_part
+from facade_tools.exteriors.groups import GROUPS, Coordinate, Group, Reading, read_part, write_part
 from facade_tools.exteriors.kernels import gaussian
 from facade_tools.exteriors.layout import building_layout
 from facade_tools.exteriors.learning import LearnOptions, learn_model
@@ -188,8 +188,8 @@ def test_one_declaration_adds_a_patio(houses):
     def read(a: Attributes) -> Reading:
         return read_part(a.tags.get("patio", (None, None)), None)
 
-    def write(fields, reading):
-        fields["patio"] = tuple(0.0 if np.isinf(v) else v for v in reading.values)
+    def write(columns, values):
+        columns["patio"] = write_part(values)
 
     patio = Group("patio", "mass", sizes, read, write, ("patio",))
     rng = np.random.default_rng(3)

@@ -13,7 +13,7 @@ import numpy as np
 from .coordinates import Floats
 from .dataset import Dataset, GroupData, floors
 from .kernels import moments
-from .network import Family, Network, Posterior, Weights, infer, inputs_of, log_
+from .network import Family, Network, Pooled, Posterior, Weights, infer, inputs_of, log_
 
 NOTHING = 1e-9
 
@@ -25,7 +25,8 @@ class Prior:
     style, hidden, table, bit: Dirichlet pseudo-counts, spread evenly over the states (hidden: over
     the group's own cluster shares). mean: of cluster means around the overall mean. slope: of
     lateral coefficients around 0. spread, freedom: Wishart on the precision with d + freedom
-    degrees; the covariance is expected near (d + freedom) · `spread` of the overall variance.
+    degrees; the covariance is expected near (d + freedom) · `spread` of the overall variance. With
+    lateral parents, overall means what the regression of all rows on them says (`Pooled`).
     """
 
     style: float = 1.0
@@ -64,18 +65,33 @@ def prior_precision(width: int, prior: Prior) -> Floats:
 
 
 def fit_gaussian(
-    uu: Floats, xu: Floats, xx: Floats, floor: Floats, prior: Prior
+    stats: Statistics, floor: Floats, prior: Prior, pooled: Pooled | None = None
 ) -> tuple[Floats, Floats]:
     """Return the MAP coef (K, d, 1+q) and cov (K, d, d) from expected moments.
 
     floor (K, d): no direction gets a smaller standard deviation, measured against it.
     """
-    d, width = xu.shape[1:]
-    a = uu + np.diag(prior_precision(width, prior))
+    _, coef, scatter = posterior_moments(stats, prior, pooled)
+    total = stats.uu[:, 0, 0][:, None, None] + _power(stats.uu.shape[1], prior)
+    return coef, clip(scatter, total, floor)
+
+
+def posterior_moments(
+    stats: Statistics, prior: Prior, pooled: Pooled | None
+) -> tuple[Floats, Floats, Floats]:
+    """Return posterior precision of u (K, 1+q, 1+q), coef (K, d, 1+q) and scatter (K, d, d)."""
+    d, width = stats.xu.shape[1:]
+    precision, mean = np.diag(prior_precision(width, prior)), prior_mean(d, width, pooled)
+    a = stats.uu + precision
+    xu = stats.xu + mean @ precision
     coef = np.linalg.solve(a, np.swapaxes(xu, 1, 2)).swapaxes(1, 2)
-    scatter = xx - coef @ a @ np.swapaxes(coef, 1, 2)
-    total = uu[:, 0, 0][:, None, None] + _power(width, prior)
-    return np.asarray(coef), clip(wishart_scale(d, prior) + scatter, total, floor)
+    scatter = wishart_scale(d, prior, pooled) + stats.xx + mean @ precision @ mean.T
+    return a, np.asarray(coef), scatter - coef @ a @ np.swapaxes(coef, 1, 2)
+
+
+def prior_mean(d: int, width: int, pooled: Pooled | None) -> Floats:
+    """Return the prior mean (d, 1+q) of (intercept, slopes)."""
+    return np.zeros((d, width)) if pooled is None else pooled.coef
 
 
 def _power(width: int, prior: Prior) -> float:
@@ -83,9 +99,10 @@ def _power(width: int, prior: Prior) -> float:
     return prior.freedom - 1 + width
 
 
-def wishart_scale(d: int, prior: Prior) -> Floats:
+def wishart_scale(d: int, prior: Prior, pooled: Pooled | None = None) -> Floats:
     """Return the scale of the inverse Wishart prior, (d, d)."""
-    return np.asarray(np.eye(d) * (prior.spread * (d + prior.freedom)))
+    spread = np.ones(d) if pooled is None else pooled.spread
+    return np.diag(spread * prior.spread * (d + prior.freedom))
 
 
 def clip(scatter: Floats, total: Floats, floor: Floats) -> Floats:
@@ -122,7 +139,7 @@ def statistics(
 
 def maximise(family: Family, stats: Statistics, floor: Floats, prior: Prior) -> Family:
     """Return the family at the maximum of its part of the expected log posterior."""
-    coef, cov = fit_gaussian(stats.uu, stats.xu, stats.xx, floor, prior)
+    coef, cov = fit_gaussian(stats, floor, prior, family.pooled)
     tables = tuple(_atoms(t, family.tied, prior) for t in stats.tables)
     hidden = family.hidden if family.direct else fit_table(stats.hidden, prior.hidden)
     return replace(family, hidden=hidden, tables=tables, coef=coef, cov=cov)
@@ -161,7 +178,8 @@ def _log_normal_wishart(family: Family, prior: Prior) -> float:
     if d == 0:
         return 0.0
     precision = np.diag(prior_precision(width, prior))
-    scatter = wishart_scale(d, prior) + family.coef @ precision @ family.coef.swapaxes(1, 2)
+    off = family.coef - prior_mean(d, width, family.pooled)
+    scatter = wishart_scale(d, prior, family.pooled) + off @ precision @ off.swapaxes(1, 2)
     logdet = np.linalg.slogdet(family.cov)[1]
     trace = np.trace(np.linalg.solve(family.cov, scatter), axis1=1, axis2=2)
     return float(-0.5 * (_power(width, prior) * logdet + trace).sum())

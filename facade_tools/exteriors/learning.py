@@ -16,12 +16,14 @@ from .coordinates import Readings, read_attributes, stack
 from .dataset import Dataset, Scaling, build, fit_scaling
 from .em import Fit, Prior, Stop, run
 from .groups import GROUPS, Boundary, Group
+from .joint_search import Joint, settled_together
+from .lateral import parent_of
 from .layout import Layout, building_layout, merged
 from .network import Network, Weights, edges
 from .prior import shipped_prior, unobserved_bits, unobserved_coordinates, weights_with_prior
 from .score import cheeseman_stutz
 from .serialisation import bits_to_model, groups_to_model
-from .structure_search import Limits, Search, Tried, parent_of, search_structure
+from .structure_search import Limits, Search, Tried, search_structure
 
 Variant = Literal["full", "no-lateral", "no-middle", "flat", "gmm"]
 
@@ -165,18 +167,18 @@ def fit_hierarchical(
     """Return the best of the searched structures after EM to the end, on all rows."""
     part = searched_rows(problem, rng)
     limits = Limits(largest=options.largest, lateral=options.variant != "no-lateral")
-    best: tuple[float, Network] | None = None
+    best: Joint | None = None
     tried: list[Tried] = []
     for restart in range(options.restarts):
         search = Search(part.layout, part.data, part.scalings, part.weights, options.prior, limits)
         search.tied = options.faithful
         search.rng = rng if restart else None
-        state = search_structure(search)
+        found = settled_together(search, search.network(search_structure(search)))
         tried += search.tried
-        if best is None or state.score > best[0]:
-            best = state.score, search.network(state)
+        if best is None or found.score > best.score:
+            best = found
     assert best is not None
-    return finished(problem, best[1], options), tried
+    return finished(problem, best.fit.network, options), tried
 
 
 def searched_rows(problem: Problem, rng: np.random.Generator) -> Problem:

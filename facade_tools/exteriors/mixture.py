@@ -12,9 +12,10 @@ import numpy as np
 
 from .coordinates import Floats
 from .dataset import Dataset, Scaling, floors
-from .em import NOTHING, Prior, maximise, statistics
+from .em import NOTHING, Prior, maximise, prior_precision, statistics
 from .layout import GroupLayout
-from .network import Family, empty_family, local_log_density, log_, log_sum
+from .network import Family, Pooled, empty_family, inputs_of, local_log_density, log_, log_sum
+from .score import log_marginal, pooled_cost
 
 CANDIDATES = 3  # clusters that are tried for a split
 TRIAL = 4  # iterations of each trial
@@ -64,7 +65,7 @@ def refit(task: Task, family: Family, clusters: Floats) -> Family:
     """
     if len(family.coef) != clusters.shape[1]:
         fresh = empty_family(task.layout, 1, clusters.shape[1])
-        family = replace(reshaped(fresh, family.inputs), tied=family.tied)
+        family = replace(reshaped(task, fresh, family.inputs), tied=family.tied)
     weight = clusters * task.weight[:, None]
     data = task.data.groups[task.group]
     hidden = weight.sum(axis=0)[None]
@@ -86,17 +87,46 @@ def improve(task: Task, start: Local, iterations: int, tolerance: float = 1e-5) 
     return fit
 
 
-def reshaped(family: Family, inputs: tuple[int, ...]) -> Family:
+def reshaped(task: Task, family: Family, inputs: tuple[int, ...]) -> Family:
     """Return the family with other lateral inputs, their slopes 0."""
     clusters, d = family.coef.shape[:2]
     coef = np.zeros((clusters, d, 1 + len(inputs)))
     coef[:, :, 0] = family.coef[:, :, 0]
-    return replace(family, inputs=inputs, coef=coef)
+    return replace(family, inputs=inputs, coef=coef, pooled=regression(task, inputs))
+
+
+def regression(task: Task, inputs: tuple[int, ...]) -> Pooled | None:
+    """Return the regression of every coordinate on the inputs, over the rows that observe it.
+
+    As careful as the prior: its precision stands for rows without any effect.
+    """
+    if not inputs:
+        return None
+    data = task.data.groups[task.group]
+    u = np.column_stack([np.ones(len(data.x)), task.data.features[:, inputs]])
+    d, width = data.x.shape[1], u.shape[1]
+    coef, spread = np.zeros((d, width)), np.ones(d)
+    for i in range(d):
+        w = task.weight * data.dense[:, i]
+        a = (u * w[:, None]).T @ u + np.diag(prior_precision(width, task.prior))
+        coef[i] = np.linalg.solve(a, u.T @ (w * data.x[:, i]))
+        rest = data.x[:, i] - u @ coef[i]
+        spread[i] = (w @ rest**2 + 1.0) / (w.sum() + 1.0)
+    return Pooled(coef, spread)
+
+
+def completed(task: Task, family: Family, clusters: Floats, inputs: tuple[int, ...]) -> float:
+    """Return the log marginal likelihood of the group's expected moments with lateral inputs."""
+    other = reshaped(task, family, inputs)
+    weight = clusters * task.weight[:, None]
+    data, features = task.data.groups[task.group], task.data.features
+    stats = statistics(other, data, features, weight, weight.sum(axis=0)[None])
+    return float(log_marginal(stats, task.prior, other.pooled).sum()) - pooled_cost(stats)
 
 
 def single(task: Task, inputs: tuple[int, ...] = (), *, tied: bool = False) -> Local:
     """Return the fit with one cluster."""
-    family = reshaped(empty_family(task.layout, 1, 1), inputs)
+    family = reshaped(task, empty_family(task.layout, 1, 1), inputs)
     family = replace(family, tied=tied)
     return improve(task, evaluate(task, family), 20)
 
@@ -109,7 +139,7 @@ def grow(task: Task, fit: Local, iterations: int = 60) -> Local:
     heavy = [k for k in np.argsort(-cost - mass) if mass[k] > LEAST_ROWS][:CANDIDATES]
     if not heavy:
         heavy = [int(np.argmax(mass))]
-    trials = [_trial(task, fit, split(task, clusters, k)) for k in heavy]
+    trials = [_trial(task, fit, split(task, fit.family, clusters, int(k))) for k in heavy]
     best = max(trials, key=lambda trial: trial.total)
     return improve(task, best, iterations)
 
@@ -128,9 +158,15 @@ def _trial(task: Task, fit: Local, clusters: Floats) -> Local:
     return improve(task, evaluate(task, family), TRIAL)
 
 
-def split(task: Task, clusters: Floats, k: int) -> Floats:
-    """Return cluster probabilities with cluster k cut across its longest direction."""
+def split(task: Task, family: Family, clusters: Floats, k: int) -> Floats:
+    """Return cluster probabilities with cluster k cut across its longest direction.
+
+    What its lateral parents explain does not count: two clusters differ in what they leave over.
+    """
     shown = appearance(task)
+    d = family.coef.shape[1]
+    explained = inputs_of(family, task.data.features) @ family.coef[k, :, 1:].T
+    shown[:, :d] -= np.where(task.data.groups[task.group].dense, explained, 0.0)
     w = clusters[:, k] * task.weight
     mean = w @ shown / max(float(w.sum()), NOTHING)
     centred = shown - mean
@@ -144,7 +180,7 @@ def split(task: Task, clusters: Floats, k: int) -> Floats:
 
 
 def appearance(task: Task) -> Floats:
-    """Return what can tell rows of the group apart: residual coordinates and states (n, m)."""
+    """Return what can tell rows of the group apart: coordinates and states (n, m)."""
     data = task.data.groups[task.group]
     states = [
         (data.states[:, c] == s).astype(np.float64)

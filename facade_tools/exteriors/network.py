@@ -15,13 +15,25 @@ LEAST_PROBABILITY = 1e-300
 
 
 @dataclass(frozen=True, slots=True)
+class Pooled:
+    """Regression of all rows on the lateral parents: where the prior of the clusters stands.
+
+    coef (d, 1 + inputs); spread (d,): variances that the parents leave over.
+    """
+
+    coef: Floats
+    spread: Floats
+
+
+@dataclass(frozen=True, slots=True)
 class Family:
     """One group's conditional distributions.
 
     hidden (|S|, K): P(H | S); of a group that hangs on S itself, the unit matrix and `direct`.
     tables: P(state | H) a channel, (K, states). inputs: features of other groups, by number.
     coef (K, d, 1 + inputs), cov (K, d, d): conditional linear Gaussian, standardised. tied: the
-    tables are the same for every cluster (variants without atoms of their own).
+    tables are the same for every cluster (variants without atoms of their own). pooled: only of
+    families with lateral parents, and only while learning.
     """
 
     hidden: Floats
@@ -31,6 +43,7 @@ class Family:
     cov: Floats
     direct: bool = False
     tied: bool = False
+    pooled: Pooled | None = None
 
 
 @dataclass(frozen=True, slots=True)

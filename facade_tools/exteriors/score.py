@@ -11,8 +11,8 @@ from scipy.special import gammaln, multigammaln
 
 from .coordinates import Floats
 from .dataset import Dataset
-from .em import Prior, Statistics, prior_precision, statistics, wishart_scale
-from .network import Family, Network, Posterior, Weights, log_
+from .em import Prior, Statistics, posterior_moments, prior_precision, statistics, wishart_scale
+from .network import Family, Network, Pooled, Posterior, Weights, log_
 
 LOG_2PI = float(np.log(2 * np.pi))
 
@@ -34,18 +34,24 @@ def gaussian_part(stats: Statistics, family: Family, prior: Prior) -> float:
     """Return log marginal minus log likelihood of expected moments, all clusters."""
     if family.coef.shape[1] == 0:
         return 0.0
-    return float((log_marginal(stats, prior) - log_complete(stats, family)).sum())
+    marginal = log_marginal(stats, prior, family.pooled)
+    return float((marginal - log_complete(stats, family)).sum()) - pooled_cost(stats)
 
 
-def log_marginal(stats: Statistics, prior: Prior) -> Floats:
+def pooled_cost(stats: Statistics) -> float:
+    """Return what the pooled slopes cost, fitted to the same rows: log(rows)/2 each (BIC)."""
+    d, width = stats.xu.shape[1:]
+    rows = float(stats.uu[:, 0, 0].sum())
+    return 0.5 * float(d * (width - 1)) * float(np.log(max(rows, 1.0)))
+
+
+def log_marginal(stats: Statistics, prior: Prior, pooled: Pooled | None = None) -> Floats:
     """Return the log marginal likelihood (K,) under the matrix-normal inverse-Wishart prior."""
     d, width = stats.xu.shape[1:]
     rows = stats.uu[:, 0, 0]
     precision = np.diag(prior_precision(width, prior))
-    after = stats.uu + precision
-    coef = np.linalg.solve(after, stats.xu.swapaxes(1, 2)).swapaxes(1, 2)
-    scale = wishart_scale(d, prior)
-    scatter = scale + stats.xx - coef @ after @ coef.swapaxes(1, 2)
+    after, _, scatter = posterior_moments(stats, prior, pooled)
+    scale = wishart_scale(d, prior, pooled)
     freedom = d + prior.freedom
     return np.asarray(
         -0.5 * rows * d * np.log(np.pi)

@@ -18,6 +18,7 @@ from . import em, mixture, styles
 from .coordinates import Floats
 from .dataset import Dataset, Scaling
 from .em import Prior, Stop, statistics
+from .lateral import Inputs, acyclic, admissible, crowded, parent_of
 from .layout import Layout
 from .mixture import Local, Task
 from .network import Network, Weights
@@ -27,9 +28,6 @@ from .styles import Evidence, Rows, Upper
 log = logging.getLogger(__name__)
 
 TOGETHER = Stop(relative=1e-5, iterations=30)
-ROWS_EACH = 10  # rows of the child that each lateral input needs at least
-KNOWN_SHARE = 0.98  # a feature is a parent only where this share of the child's rows knows it
-Inputs = tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -231,49 +229,6 @@ def resized(search: Search, state: State, g: int, size: int, inputs: Inputs) -> 
 # --- lateral edges ------------------------------------------------------------------------------
 
 
-def admissible(data: Dataset, weights: Weights, layout: Layout) -> list[dict[int, Inputs]]:
-    """Return for each child the features that each parent group (−1 …: bits) can show it.
-
-    A feature counts only where (nearly) all rows that observe the child know it, and where it
-    varies among them.
-    """
-    owners = parent_of(layout)
-    out = []
-    for g, group in enumerate(data.groups):
-        rows = group.dense.any(axis=1) & (weights.groups[g] > 0)
-        usable: dict[int, list[int]] = {}
-        if rows.any() and layout.groups[g].coordinates:
-            known = data.known[rows].mean(axis=0)
-            varies = data.features[rows].std(axis=0) > 1e-6
-            for f in np.flatnonzero((known >= KNOWN_SHARE) & varies):
-                if owners[f] != g:
-                    usable.setdefault(owners[f], []).append(int(f))
-        out.append({parent: tuple(features) for parent, features in usable.items()})
-    return out
-
-
-def parent_of(layout: Layout) -> list[int]:
-    """Return the owner of each feature: a group, or −1, −2, … a vector of bits."""
-    names = [group.name for group in layout.bit_groups]
-    return [
-        owner if owner >= 0 else -1 - names.index(name.split(".")[0])
-        for owner, name in zip(layout.feature_group, layout.features, strict=True)
-    ]
-
-
-def acyclic(inputs: tuple[Inputs, ...], layout: Layout) -> bool:
-    """Tell whether the lateral edges, with r1 before r2, have no cycle."""
-    owners = parent_of(layout)
-    parents = [{owners[f] for f in features if owners[f] >= 0} for features in inputs]
-    names = [group.name for group in layout.groups]
-    if "far" in names and "arf" in names:
-        parents[names.index("arf")].add(names.index("far"))
-    done: set[int] = set()
-    while ready := [g for g, p in enumerate(parents) if g not in done and p <= done]:
-        done.update(ready)
-    return len(done) == len(parents)
-
-
 def greedy_edges(search: Search, state: State, bits: bool = False) -> State:
     """Add the lateral edge that raises the score most, until none does."""
     options = admissible(search.data, search.weights, search.layout)
@@ -307,8 +262,8 @@ def _best_edge(
             break
         inputs = tuple(sorted({*state.inputs[g], *options[g][parent]}))
         proposed = (*state.inputs[:g], inputs, *state.inputs[g + 1 :])
-        crowded = len(inputs) * ROWS_EACH > _rows(search, g)
-        if crowded or inputs == state.inputs[g] or not acyclic(proposed, search.layout):
+        narrow = crowded(inputs, search.data.groups[g])
+        if narrow or inputs == state.inputs[g] or not acyclic(proposed, search.layout):
             continue
         after = with_edge(search, state, g, inputs)
         gains[(g, parent)] = after.score - state.score
@@ -327,15 +282,11 @@ def pruned(search: Search, state: State) -> State:
     ]
     for g, parent in sorted(pairs):
         rest = tuple(f for f in state.inputs[g] if owners[f] != parent)
+        warm(search, g, state.sizes[g], state.inputs[g], rest, again=True)
         after = with_edge(search, state, g, rest)
         if after.score > state.score:
             state = after
     return state
-
-
-def _rows(search: Search, g: int) -> int:
-    """Return how many rows observe a coordinate of group g."""
-    return int(search.data.groups[g].dense.any(axis=1).sum())
 
 
 def with_edge(search: Search, state: State, g: int, inputs: Inputs) -> State:
@@ -345,17 +296,26 @@ def with_edge(search: Search, state: State, g: int, inputs: Inputs) -> State:
     return resized(search, state, g, size, inputs)
 
 
-def warm(search: Search, g: int, size: int, before: Inputs, after: Inputs) -> None:
-    """Fit a family with other inputs, warm from the clusters that it had."""
+def warm(
+    search: Search, g: int, size: int, before: Inputs, after: Inputs, *, again: bool = False
+) -> None:
+    """Fit a family with other inputs, warm from the clusters that it had.
+
+    again: even where such a family has been fitted before; the better one stays.
+    """
     key = (g, size, after)
-    if key in search.families:
+    known = search.families.get(key)
+    if known is not None and not again:
         return
     task = search.task(g)
     old = search.family(g, size, before)[0]
-    family = mixture.reshaped(old.family, after)
+    family = mixture.reshaped(task, old.family, after)
     first = mixture.evaluate(task, mixture.refit(task, family, old.clusters))
     fit = mixture.improve(task, first, 15)
-    search.families[key] = (fit, search.part(g, fit))
+    part = search.part(g, fit)
+    if known is None or fit.total + part > known[0].total + known[1]:
+        search.families[key] = (fit, part)
+        search.scaled.pop(key, None)
 
 
 # --- the search ---------------------------------------------------------------------------------

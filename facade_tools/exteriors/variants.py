@@ -14,12 +14,13 @@ import numpy as np
 from . import mixture
 from .coordinates import Floats
 from .dataset import Dataset, Scaling
-from .em import Fit, Prior, Stop, run, statistics
+from .em import Fit, Prior, Stop, run
+from .lateral import Inputs, acyclic, admissible
 from .layout import Layout
 from .mixture import Local, Task, reshaped
 from .network import Family, Network, Weights, empty_family
-from .score import cheeseman_stutz, log_marginal
-from .structure_search import Inputs, Tried, acyclic, admissible
+from .score import cheeseman_stutz
+from .structure_search import Tried
 from .styles import cut
 
 WARM = Stop(relative=1e-5, iterations=40)
@@ -89,7 +90,7 @@ def direct_network(rows: Rows, posterior: Floats, families: tuple[Family, ...]) 
 def direct_sweep(rows: Rows, inputs: tuple[Inputs, ...], largest: int) -> Iterator[Scored]:
     """Yield the fits for |S| = 1, 2, … `largest`, each warm from the one before."""
     blank = tuple(
-        replace(reshaped(empty_family(group, 1, 1), inputs[g]), tied=rows.tied)
+        replace(reshaped(rows.task(g), empty_family(group, 1, 1), inputs[g]), tied=rows.tied)
         for g, group in enumerate(rows.layout.groups)
     )
     network = direct_network(rows, np.ones((len(rows.data), 1)), blank)
@@ -170,11 +171,8 @@ def complete_edges(rows: Rows, fit: Fit, *, bits: bool) -> tuple[Inputs, ...]:
 
 def complete_score(rows: Rows, fit: Fit, g: int, inputs: Inputs) -> float:
     """Return the log marginal likelihood of group g's expected moments with these inputs."""
-    family = reshaped(fit.network.families[g], inputs)
-    weight = fit.posterior.clusters[g] * rows.weights.groups[g][:, None]
-    data = rows.data.groups[g]
-    stats = statistics(family, data, rows.data.features, weight, fit.posterior.joint[g])
-    return float(log_marginal(stats, rows.prior).sum())
+    family, clusters = fit.network.families[g], fit.posterior.clusters[g]
+    return mixture.completed(rows.task(g), family, clusters, inputs)
 
 
 # --- the plain mixture --------------------------------------------------------------------------

@@ -1,0 +1,152 @@
+"""The last steps of the search: edges and sizes judged after EM of the whole network.
+
+Families fitted one by one (`structure_search`) rank configurations quickly, but an edge that makes
+up for a family's poor fit looks needed. Here every proposal goes through EM together and is judged
+by its own Cheeseman-Stutz score.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from . import mixture
+from .em import Fit, Stop, run
+from .lateral import Inputs, acyclic, admissible, crowded, parent_of
+from .network import Network
+from .score import cheeseman_stutz
+from .structure_search import Search, Tried
+
+TOGETHER = Stop(relative=1e-5, iterations=40)
+PROPOSALS = 3  # that may fail one after the other
+DOUBT = 10.0  # nats by which a proposal may look worse before EM has adapted to it
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """A network after EM together, and its score."""
+
+    fit: Fit
+    score: float
+
+
+def joint(search: Search, network: Network) -> Joint:
+    """Return a network after EM together; the configuration counts as tried."""
+    fit = run(network, search.data, search.prior, weights=search.weights, stop=TOGETHER)
+    score = cheeseman_stutz(fit.network, search.data, search.weights, fit.posterior, search.prior)
+    families = fit.network.families
+    sizes = tuple(len(family.coef) for family in families)
+    inputs = tuple(family.inputs for family in families)
+    search.tried.append(Tried(len(fit.network.style), sizes, inputs, score))
+    return Joint(fit, score)
+
+
+def settled_together(search: Search, network: Network) -> Joint:
+    """Change single lateral edges and sizes while the score after EM together rises."""
+    best = joint(search, network)
+    if not search.limits.lateral:
+        return best
+    best = settled_edges(search, best)
+    grown = settled_sizes(search, best)
+    return best if grown is best else settled_edges(search, grown)
+
+
+def settled_edges(search: Search, best: Joint) -> Joint:
+    """Add and drop single lateral edges while the score rises.
+
+    A group with too few clusters borrows an edge that tells them apart: one that cannot be dropped
+    may be with a cluster more.
+    """
+    options = admissible(search.data, search.weights, search.layout)
+    failed: set[tuple[int, Inputs]] = set()
+    while True:
+        proposals = [p for p in ranked(search, best.fit, options) if p not in failed]
+        for g, inputs in proposals[:PROPOSALS]:
+            after = joint(search, proposed(search, best.fit, g, inputs))
+            if len(inputs) < len(best.fit.network.families[g].inputs) and after.score < best.score:
+                after = grown(search, after, g)
+            if after.score > best.score:
+                best = after
+                break
+            failed.add((g, inputs))
+        else:
+            return best
+
+
+def settled_sizes(search: Search, best: Joint) -> Joint:
+    """Cut a cluster of each group in turn where that raises the score."""
+    for g in range(len(search.layout.groups)):
+        best = grown(search, best, g)
+    return best
+
+
+def grown(search: Search, best: Joint, g: int) -> Joint:
+    """Return the network with a cluster more in group g if its score is higher."""
+    if len(best.fit.network.families[g].coef) >= search.limits.largest:
+        return best
+    after = joint(search, cut(search, best.fit, g))
+    return after if after.score > best.score else best
+
+
+def cut(search: Search, fit: Fit, g: int) -> Network:
+    """Return the network with the cluster of group g that foresees its rows worst cut in two."""
+    task, family, clusters = search.task(g), fit.network.families[g], fit.posterior.clusters[g]
+    local = mixture.evaluate(
+        task, replace(family, hidden=(fit.network.style @ family.hidden)[None])
+    )
+    cost = -(task.weight[:, None] * clusters * local.local).sum(axis=0)
+    worst = int(np.argmax(cost))
+    halves = mixture.split(task, family, clusters, worst)
+    fresh = mixture.refit(task, family, halves)
+    shares = task.weight @ halves[:, -2:]
+    last = family.hidden[:, [worst]] * (shares / shares.sum())
+    hidden = np.concatenate([np.delete(family.hidden, worst, axis=1), last], axis=1)
+    families = list(fit.network.families)
+    families[g] = replace(fresh, hidden=hidden)
+    return replace(fit.network, families=tuple(families))
+
+
+def ranked(search: Search, fit: Fit, options: list[dict[int, Inputs]]) -> list[tuple[int, Inputs]]:
+    """Return child and new inputs of promising changes, best first.
+
+    Judged by the completed data's marginal likelihood under the posterior as it stands.
+    """
+    gains = []
+    for g, table in enumerate(options):
+        changes = list(changed(search, fit.network, g, table))
+        if changes:
+            task, family = search.task(g), fit.network.families[g]
+            now, *after = (
+                mixture.completed(task, family, fit.posterior.clusters[g], inputs)
+                for inputs in (family.inputs, *changes)
+            )
+            gains += [
+                (value - now, g, inputs) for value, inputs in zip(after, changes, strict=True)
+            ]
+    return [(g, inputs) for gain, g, inputs in sorted(gains, reverse=True) if gain > -DOUBT]
+
+
+def changed(search: Search, network: Network, g: int, table: dict[int, Inputs]) -> Iterator[Inputs]:
+    """Yield the inputs of group g with one parent more or less."""
+    owners = parent_of(search.layout)
+    all_inputs = [family.inputs for family in network.families]
+    now = all_inputs[g]
+    for parent in sorted({owners[f] for f in now}):
+        yield tuple(f for f in now if owners[f] != parent)
+    for parent, features in sorted(table.items()):
+        wider = tuple(sorted({*now, *features}))
+        after = (*all_inputs[:g], wider, *all_inputs[g + 1 :])
+        possible = parent >= 0 and wider != now and acyclic(after, search.layout)
+        if possible and not crowded(wider, search.data.groups[g]):
+            yield wider
+
+
+def proposed(search: Search, fit: Fit, g: int, inputs: Inputs) -> Network:
+    """Return the network after an M-step of group g with these inputs."""
+    task, family = search.task(g), fit.network.families[g]
+    fresh = mixture.refit(task, mixture.reshaped(task, family, inputs), fit.posterior.clusters[g])
+    families = list(fit.network.families)
+    families[g] = replace(fresh, hidden=family.hidden)
+    return replace(fit.network, families=tuple(families))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +19,8 @@ from ..imaging.features_fine import enlarged, fine_features
 from .trees import LEAD, Codes, Trees, softmax
 
 CERTAIN = 0.98  # what the stages before believe more than this stays
-BLOCK = 50_000  # pixels whose codes are in memory at once
+BLOCK = 20_000  # pixels whose codes are in memory at once, in each thread
+THREADS = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +76,11 @@ def finished(trees: Trees, planes: Planes) -> Probabilities:
     out = np.zeros((trees.classes, height * width), np.float32)
     if planes.belief is not None:
         out[:] = planes.belief.reshape(trees.classes, -1)
-    for start in range(0, len(where), BLOCK):
-        at = where[start : start + BLOCK]
+
+    def fill(at: NDArray[np.intp]) -> None:
         out[:, at] = softmax(trees.scores(planes.codes(at), LEAD)).T
+
+    blocks = [where[start : start + BLOCK] for start in range(0, len(where), BLOCK)]
+    with ThreadPoolExecutor(THREADS) as pool:  # compiled loops let go of the interpreter
+        list(pool.map(fill, blocks))
     return out.reshape(-1, height, width)

@@ -11,6 +11,7 @@ from pathlib import Path
 import click
 
 from facade_tools.artifacts.blocks import Blocks
+from facade_tools.artifacts.layout import Layout
 from facade_tools.artifacts.provenance import Provenance
 from facade_tools.artifacts.store import digest, read_raw
 from facade_tools.artifacts.writing import atomic_folder, write_bytes
@@ -19,7 +20,7 @@ from facade_tools.formats.exporting import model_files
 from facade_tools.formats.mesh_reader import ENDINGS, read_textured
 from facade_tools.formats.style_folder import read_style, write_style
 from facade_tools.randomness import item_generator
-from facade_tools.stylization.bases import building_blocks, mesh_blocks
+from facade_tools.stylization.bases import building_blocks, layout_blocks, mesh_blocks, with_ends
 from facade_tools.stylization.capture import capture_style
 from facade_tools.stylization.model import CaptureOptions
 from facade_tools.stylization.resizing import resized
@@ -60,18 +61,26 @@ def run_capture(model: str, output: str, options: CaptureOptions, unit: str) -> 
 
 
 def run_retarget(
-    styles: Sequence[str], bases: Sequence[str], output: str, resize: Sequence[str], seed: int
+    styles: Sequence[str],
+    bases: Sequence[str],
+    output: str,
+    resize: Sequence[str],
+    small: float,
+    seed: int,
 ) -> None:
     """Put styles onto all bases and write their models."""
     sheets = [Style(*read_style(Path(folder))) for folder in styles]
     sizes = dict(_size(text) for text in resize)
     progress = Progress("retarget")
     seen: set[str] = set()
-    for base in _bases(bases):
+    for base, plain in _bases(bases):
         blocks = resized(base, sizes) if sizes else base
         rng = item_generator(seed, "retarget", base.id)
         style = chosen_style([s.sheet.blocks for s in sheets], blocks.blocks, rng=rng)
-        scene = retarget(sheets[style], blocks)
+        chosen = sheets[style]
+        if plain:
+            blocks = with_ends(blocks, chosen.blocks)
+        scene = retarget(chosen, blocks, small)
         if base.id in seen and is_folder(output):
             raise InvalidInput(f"id {base.id!r} stands twice; expected unique ids in a folder")
         if seen and not is_folder(output):
@@ -95,14 +104,20 @@ def _size(text: str) -> tuple[str, tuple[float, float, float]]:
     return match.group(1), (numbers[0], numbers[1], numbers[2])
 
 
-def _bases(paths: Sequence[str]) -> Iterator[Blocks]:
+def _bases(paths: Sequence[str]) -> Iterator[tuple[Blocks, bool]]:
+    """Yield every base, and whether it may be given a bottom and a top."""
     for path in paths:
         if Path(path).suffix.lower() in ENDINGS:
-            yield mesh_blocks(read_textured(Path(path)), file_name(Path(path).parent.name))
+            yield mesh_blocks(read_textured(Path(path)), file_name(Path(path).parent.name)), True
             continue
         for item in read_raw([path]):
-            artifact = item.artifact("blocks", "building")
-            yield artifact if isinstance(artifact, Blocks) else building_blocks(artifact)
+            artifact = item.artifact("blocks", "building", "layout")
+            if isinstance(artifact, Blocks):
+                yield artifact, False
+            elif isinstance(artifact, Layout):
+                yield layout_blocks(artifact), True
+            else:
+                yield building_blocks(artifact), True
 
 
 def _target(output: str, identity: str) -> tuple[str, str, Path]:

@@ -26,7 +26,7 @@ from facade_tools.imaging.render import Picture, render
 
 from ._items import each, load
 from ._options import StreamOptions
-from .view import DRAWINGS
+from .view import DRAWINGS, WITH_FILES
 
 MOST_PICTURES = 2000
 LARGEST_PAGE = 256 << 20  # bytes of the items of a page
@@ -61,7 +61,8 @@ class Drawing:
             return name, self.seen(drawn)
         artifact = item.artifact(*DRAWINGS)
         try:
-            drawn = self.seen(load(DRAWINGS[artifact.kind])(artifact))
+            files = (Path(item.source).parent,) if artifact.kind in WITH_FILES else ()
+            drawn = self.seen(load(DRAWINGS[artifact.kind])(artifact, *files))
             beside = self.beside(artifact)
             return artifact.id, drawn + beside if beside else drawn
         except InvalidInput as error:

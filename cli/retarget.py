@@ -23,6 +23,14 @@ from ._options import output, seed
     metavar="BLOCK=WxDxH",
     help="New width, depth and height of a block, metres (repeatable).",
 )
+@click.option(
+    "--reassign",
+    type=click.FloatRange(0, 1),
+    default=0.05,
+    show_default=True,
+    help="Share of a side's area below which a group of faces, on blocks that stand together "
+    "otherwise than in the source, takes the texture of a larger group; 0 never.",
+)
 @seed
 def command(
     style: str,
@@ -30,12 +38,14 @@ def command(
     output: str | None,
     styles: tuple[str, ...],
     resize: tuple[str, ...],
+    reassign: float,
     seed: int,
 ) -> None:
     """Put the look of a style sheet onto buildings of another structure (LNSW13).
 
-    BASE is blocks.json (of a style sheet, or hand-written), buildings (.json, .jsonl, -), or a
-    mesh. PATH is a .glb or .obj file, or a folder that gets a GLB a base.
+    BASE is blocks.json (of a style sheet, or hand-written), buildings or layouts (.json, .jsonl,
+    -), or a mesh. PATH is a .glb or .obj file, or a folder that gets a GLB a base. Buildings,
+    layouts and meshes get a bottom and a top as high as the style's where there is room.
 
     \b
     Example:
@@ -45,4 +55,4 @@ def command(
 
     if output is None:
         raise click.UsageError("Missing option '-o': name a .glb, an .obj or a folder.")
-    run_retarget((style, *styles), bases, output, resize, seed)
+    run_retarget((style, *styles), bases, output, resize, reassign, seed)

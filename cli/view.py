@@ -21,6 +21,7 @@ DRAWINGS = {
     "parse": "facade_tools.imaging.label_views:parse_view",
     "derivation": "facade_tools.reconstruction.records:derivation_scene",
 }
+WITH_FILES = ("stylesheet",)  # their function takes the artifact's folder too
 
 MOST_PIXELS = 16_000_000
 

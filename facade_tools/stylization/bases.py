@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from ..artifacts.blocks import Block, Blocks
+from ..artifacts.blocks import Block, BlockRole, Blocks
 from ..artifacts.building import Box, Building
+from ..artifacts.layout import Layout
 from ..formats.textured import TexturedMesh
 from ..geometry.arrays import Floats
 from .model import CaptureOptions, modelled
 
 Rectangle = tuple[float, float, float, float]
+STOREY = 3.0  # m
+HOUSE_DEPTH = 10.0  # m behind a layout's canvas
+BAY, BAY_DEPTH = 2.0, 0.5  # m: least width and height, and depth, of a bay
 
 
 def building_blocks(building: Building) -> Blocks:
@@ -64,6 +69,77 @@ def _block(box: Box, rectangle: Rectangle, number: int, storey: float) -> Block:
     floors = max(1, round(height / storey))
     name = f"{box.id}-{number}"
     return Block(name, "body", x0, y0, 0.0, x1 - x0, y1 - y0, height, floors)
+
+
+def layout_blocks(layout: Layout) -> Blocks:
+    """Return a layout as the front of a house: the canvas 10 m deep, its bays standing forward.
+
+    A bay is a visible shape at least 2 m wide and high and half a metre deep; finer shapes are
+    ornaments, which the style brings itself.
+    """
+    width, height = layout.canvas.width, layout.canvas.height
+    floors = max(1, round(height / STOREY))
+    blocks = [Block("canvas", "body", 0.0, 0.0, 0.0, width, HOUSE_DEPTH, height, floors)]
+    for number, shape in enumerate(layout.shapes):
+        x, z = shape.x0, shape.y0
+        size = shape.x1 - x, shape.depth, shape.y1 - z
+        if shape.visible and min(size[0], size[2]) >= BAY and size[1] >= BAY_DEPTH:
+            floors = max(1, round(size[2] / STOREY))
+            name = f"{shape.layer}-{number}"
+            blocks.append(Block(name, "body", x, -size[1], z, *size, floors))
+    return Blocks(layout.id, tuple(blocks))
+
+
+def with_ends(base: Blocks, style: Blocks) -> Blocks:
+    """Return a base without roles with a bottom and a top cut off its blocks as the style has them.
+
+    What stands on the ground gets a bottom as high as the style's (its shops), what is open to
+    the sky a top as high as the style's where that is as wide as its body (an attic, no lift
+    house); each only where at least twice as much is left between. A base with roles is kept.
+    """
+    if any(block.role != "body" for block in base.blocks):
+        return base
+    low, high = _end_height(style, "bottom"), _end_height(style, "top")
+    ground = min(block.z for block in base.blocks)
+    blocks: list[Block] = []
+    for block in base.blocks:
+        foot = low if block.z < ground + 0.1 else 0.0
+        head = 0.0 if any(_stands_on(other, block) for other in base.blocks) else high
+        blocks += _with_ends(block, foot, head)
+    return replace(base, blocks=tuple(blocks))
+
+
+def _end_height(style: Blocks, role: str) -> float:
+    """Return the height (m) of a style's bottom or top; 0 where it has none or a narrow one."""
+    ends = [block for block in style.blocks if block.role == role]
+    area = sum(block.width * block.depth for block in ends)
+    body = max((b.width * b.depth for b in style.blocks if b.role == "body"), default=0.0)
+    if not ends or area < 0.6 * body:
+        return 0.0
+    return max(b.z + b.height for b in ends) - min(b.z for b in ends)
+
+
+def _stands_on(upper: Block, lower: Block) -> bool:
+    return (
+        abs(lower.z + lower.height - upper.z) < 1e-3
+        and min(lower.x + lower.width, upper.x + upper.width) > max(lower.x, upper.x)
+        and min(lower.y + lower.depth, upper.y + upper.depth) > max(lower.y, upper.y)
+    )
+
+
+def _with_ends(block: Block, foot: float, head: float) -> list[Block]:
+    foot = foot if block.height >= 3 * foot else 0.0
+    head = head if block.height - foot >= 3 * head else 0.0
+    middle = block.height - foot - head
+    levels: list[tuple[BlockRole, float]] = [("bottom", foot), ("body", middle), ("top", head)]
+    parts, z = [], block.z
+    for role, height in levels:
+        if height > 0:
+            name = block.id if role == "body" else f"{block.id}-{role}"
+            floors = max(1, round(block.floors * height / block.height))
+            parts.append(replace(block, id=name, role=role, z=z, height=height, floors=floors))
+        z += height
+    return parts
 
 
 def _frame(building: Building) -> tuple[tuple[float, ...], ...] | None:

@@ -11,6 +11,7 @@ from ..geometry.arrays import Floats, Integers
 from ..imaging.image_io import Picture
 from .splitting import Split, SplitRule, split
 
+CLEAR = 0.2  # of a wall beside windows, that a face without windows leaves out at either end
 SMEARED = 2.0  # stretch of walls beyond which their texture repeats
 
 
@@ -40,16 +41,18 @@ def positions(rule: SplitRule, source: float, target: float, pixels: int) -> Flo
     starts = np.concatenate([[0.0], np.cumsum(widths)])[:-1]
     index = np.array(done.sources)[section]
     share = (centres - borders[section]) / np.maximum(np.diff(borders)[section], 1e-12)
-    share = _unsmeared(share, done, section)
+    share = _unsmeared(share, done, section, bool(own.insertable))
     places: Floats = np.clip((starts[index] + share * widths[index]) / source, 0.0, 1.0)
     return places
 
 
-def _unsmeared(share: Floats, done: Split, section: Integers) -> Floats:
+def _unsmeared(share: Floats, done: Split, section: Integers, framed: bool) -> Floats:
     """Run through much stretched walls to and fro instead of smearing their pixels.
 
     An odd number of runs begins and ends like the section itself.
     """
+    if not done.windows:  # a plain face: what frames the windows stays off its edges
+        share = CLEAR + (1 - 2 * CLEAR) * share if framed else share
     if not SMEARED < done.stretch < math.inf:
         return share
     runs = 2 * round((done.stretch - 1) / 2) + 1

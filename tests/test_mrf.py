@@ -1,0 +1,215 @@
+from __future__ import annotations
+
+import json
+from contextlib import suppress
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from facade_tools.artifacts.documents import decode, encode
+from facade_tools.artifacts.parse import LABELS
+from facade_tools.errors import Infeasible
+from facade_tools.imaging.image_io import Photo
+from facade_tools.reconstruction.evidence import agreement, profiles, window_evidence
+from facade_tools.reconstruction.lines import differences, earth_movers, segments
+from facade_tools.reconstruction.mrf import Scale, read_facade
+from facade_tools.reconstruction.storeys import period, skyline
+
+WALL, GLASS, SKY, SHOP = (206, 190, 160), (50, 60, 74), (180, 205, 240), (90, 40, 36)
+FLOOR, STRIPE = 60, 70  # pixels
+
+
+def drawn(rows: int, columns: int, seed: int = 0, sky: int = 40) -> np.ndarray:
+    """A wall of windows over a shop, under the sky; 20 pixels a metre."""
+    height, width = sky + rows * FLOOR + 80, columns * STRIPE + 30
+    picture = np.empty((height, width, 3), np.float64)
+    picture[:] = WALL
+    picture[:sky] = SKY
+    picture[-70:] = SHOP
+    for row in range(rows):
+        for column in range(columns):
+            y, x = sky + row * FLOOR + 14, 30 + column * STRIPE
+            picture[y : y + 36, x : x + 26] = GLASS
+    picture += np.random.default_rng(seed).normal(0, 6, picture.shape)
+    return np.clip(cv2.GaussianBlur(picture, (0, 0), 0.8), 0, 255).astype(np.uint8)
+
+
+def photo_of(pixels: np.ndarray) -> Photo:
+    return Photo("facade.png", pixels, "0" * 64)
+
+
+def read(pixels: np.ndarray, scale: Scale | None = None, **options):
+    rng = np.random.default_rng(0)
+    return read_facade(scale or Scale(), photo_of(pixels), "facade", rng=rng, **options)
+
+
+def windows_of(parse) -> np.ndarray:
+    return np.array([(r.x0, r.y0, r.x1, r.y1) for r in parse.regions if r.label == "window"])
+
+
+def assert_tiles(parse) -> None:
+    """Every pixel lies in exactly one region."""
+    width, height = parse.image.size
+    count = np.zeros((height, width), int)
+    for region in parse.regions:
+        count[region.y0 : region.y1, region.x0 : region.x1] += 1
+    assert (count == 1).all()
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(3, 4), (5, 3), (6, 6), (4, 9)])
+def test_a_clean_grid_is_found_window_by_window(rows, columns):
+    parse = read(drawn(rows, columns)).parse
+    assert_tiles(parse)
+    found = windows_of(parse)
+    assert len(found) == rows * columns
+    for row in range(rows):
+        for column in range(columns):
+            y, x = 40 + row * FLOOR + 14, 30 + column * STRIPE
+            off = np.abs(found - [x, y, x + 26, y + 36]).max(axis=1)
+            assert off.min() <= 8
+
+
+def test_the_same_picture_gives_the_same_parse_and_a_valid_artifact():
+    one, two = (read(drawn(4, 4)).parse for _ in range(2))
+    assert one == two
+    assert one.optimal
+    assert one.bound == one.energy
+    assert one.method == "mrf"
+    assert decode(encode(one), "parse").regions == one.regions
+
+
+def test_labels_are_the_regions_painted():
+    reading = read(drawn(4, 4))
+    for region in reading.parse.regions:
+        part = reading.labels[region.y0 : region.y1, region.x0 : region.x1]
+        assert (part == LABELS.index(region.label)).all()
+    assert reading.raw.shape == reading.labels.shape
+
+
+def test_sky_and_shop_are_no_wall():
+    parse = read(drawn(5, 4)).parse
+    sky = [r for r in parse.regions if r.label == "sky"]
+    assert len(sky) == 1
+    assert abs(sky[0].y1 - 40) <= 4
+    ground = parse.floors[0]
+    assert ground.y1 == parse.image.size[1]
+    assert len(ground.columns) == 2
+
+
+def test_metres_come_from_a_height_or_a_storey():
+    pixels = drawn(5, 4)
+    assert read(pixels).parse.tags["scale"] == "relative"
+    storey = read(pixels, Scale(storey=4.2)).parse
+    assert storey.tags["scale"] == "storey-height"
+    assert storey.tags["metres_per_pixel"] == pytest.approx(4.2 / FLOOR, rel=0.03)
+    tall = read(pixels, Scale(height=17.0)).parse
+    assert tall.tags["metres_per_pixel"] == pytest.approx(17.0 / (len(pixels) - 40), rel=0.03)
+    assert len(windows_of(tall)) == 20
+
+
+def test_what_is_hidden_says_nothing():
+    pixels = drawn(5, 4)
+    spoilt = pixels.copy()
+    mask = np.zeros(pixels.shape[:2], bool)
+    mask[150:260, 40:160] = True
+    spoilt[mask] = np.random.default_rng(1).integers(0, 255, (int(mask.sum()), 3))
+    assert len(windows_of(read(spoilt, mask=mask).parse)) == 20
+
+
+@pytest.mark.parametrize("pixels", [
+    np.full((300, 200, 3), 128, np.uint8), np.zeros((90, 900, 3), np.uint8),
+    np.random.default_rng(0).integers(0, 255, (400, 300, 3)).astype(np.uint8),
+])  # fmt: skip
+def test_a_picture_of_nothing_is_read_without_harm(pixels):
+    assert_tiles(read(pixels).parse)
+
+
+@settings(deadline=None, max_examples=8)
+@given(st.integers(30, 400), st.integers(30, 400), st.integers(0, 99))
+def test_regions_always_tile(height, width, seed):
+    small = np.random.default_rng(seed).integers(0, 255, (5, 4, 3)).astype(np.uint8)
+    pixels = cv2.resize(small, (width, height), interpolation=cv2.INTER_NEAREST)
+    with suppress(Infeasible):  # too small, or lower than a floor
+        assert_tiles(read(pixels).parse)
+
+
+def test_a_picture_too_small_is_refused():
+    with pytest.raises(Infeasible, match="too small"):
+        read(np.zeros((5, 3, 3), np.uint8), Scale(height=2.0))
+
+
+def test_profiles_are_those_of_a_product():
+    down, across = np.zeros(40), np.zeros(50)
+    down[5:15] = down[25:35] = 1.0
+    across[4:10] = across[20:26] = across[40:46] = 1.0
+    plane = np.outer(down, across - across.mean()).astype(np.float32)
+    rows, columns = profiles(plane)
+    assert (rows[down > 0] > 0.5).all()
+    assert np.allclose(rows[down == 0], 0)
+    assert columns[across > 0].min() > columns[across == 0].max()
+    assert (agreement(plane, columns, 1.0)[down > 0] > 0.4).all()
+
+
+def test_the_rim_of_a_rectified_picture_says_nothing():
+    pixels = drawn(4, 4)
+    pixels[:, :25] = 0
+    evidence = window_evidence(pixels)
+    assert (evidence.seen[:, :25] == 0).all()
+    assert (evidence.plane[:, :25] == 0).all()
+    assert evidence.seen[:, 40:].mean() > 0.99
+
+
+def test_the_period_of_a_rhythm():
+    assert period(np.sin(np.arange(240) * 2 * np.pi / 30)) == pytest.approx(30, abs=1)
+    assert period(np.zeros(100)) == 20
+
+
+def transport(one: np.ndarray, two: np.ndarray, palette: np.ndarray) -> float:
+    """The earth mover's distance as a linear programme."""
+    from scipy.optimize import linprog
+
+    k = len(one)
+    cost = np.linalg.norm(palette[:, None] - palette[None], axis=2).ravel()
+    sums = np.vstack([np.kron(np.eye(k), np.ones(k)), np.kron(np.ones(k), np.eye(k))])
+    given = np.concatenate([one / one.sum(), two / two.sum()])
+    return float(linprog(cost, A_eq=sums, b_eq=given).fun)
+
+
+def test_the_earth_movers_distance_is_the_cheapest_transport():
+    rng = np.random.default_rng(0)
+    palette = rng.uniform(0, 100, (5, 3)).astype(np.float32)
+    for _ in range(5):
+        one, two = rng.integers(0, 9, (2, 5)) + np.array([[1], [0]])
+        two[0] += 1
+        expected = transport(one.astype(float), two.astype(float), palette)
+        assert earth_movers(one.astype(float), two.astype(float), palette) == pytest.approx(
+            expected, rel=1e-3, abs=1e-3
+        )
+    assert earth_movers(one.astype(float), np.zeros(5), palette) == 0.0
+
+
+def test_the_skyline_is_where_the_colours_change():
+    pixels = drawn(5, 4)
+    found = segments(pixels, np.ones(pixels.shape[:2], np.float32))
+    rows = np.zeros(len(pixels))
+    rows[50:300] = 0.8
+    assert abs(skyline(differences(found, 30), rows) - 40) <= 3
+    below = differences(found, 30, top=200)
+    assert (below[:201] == 0).all()
+    assert below[201:].any()
+
+
+def test_the_command_writes_a_parse_and_its_pictures(tmp_path, facade_here):
+    source = tmp_path / "front.png"
+    cv2.imwrite(str(source), drawn(3, 4)[:, :, ::-1])
+    target = tmp_path / "parse.json"
+    options = ["--method", "mrf", "--storey-height", "3.2", "-o", target]
+    done = facade_here("parse-image", source, *options, "--overlay", tmp_path / "overlay.png")
+    assert done.returncode == 0, done.stderr
+    document = json.loads(target.read_text())
+    assert document["tags"]["scale"] == "storey-height"
+    assert document["provenance"]["options"]["storey_height"] == 3.2
+    assert (tmp_path / "overlay.png").stat().st_size > 0

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import cv2
 import numpy as np
 
 from facade_tools.grammar.library import builtin
@@ -17,21 +16,20 @@ from facade_tools.randomness import item_generator
 from facade_tools.segmentation.painting import render_facade
 
 FOLDER = Path(__file__).resolve().parent / "photos"
-SIZES = {"facade-1": 190, "facade-2": 250, "facade-3": 150}
-HEIGHT = 288
+SIZES = {"facade-1": 380, "facade-2": 500, "facade-3": 300}
+HEIGHT = 576
 
 
 def main() -> None:
     """Write the pictures."""
     FOLDER.mkdir(exist_ok=True)
     for number, (name, width) in enumerate(SIZES.items()):
-        rng = item_generator(11, "sample-photo", number)
+        rng = item_generator(12, "sample-photo", number)
         _, picture, _ = render_facade(builtin("haussmann-floors"), width, HEIGHT, rng=rng)
-        large = cv2.resize(picture, (2 * width, 2 * HEIGHT), interpolation=cv2.INTER_CUBIC)
-        (FOLDER / f"{name}.jpg").write_bytes(encoded(large.astype(np.uint8), ".jpg"))
+        (FOLDER / f"{name}.jpg").write_bytes(encoded(picture, ".jpg"))
     corners = np.array([[0, 0], [300, 0], [300, 576], [0, 576]], np.float64)
     seen = np.array([[90, 40], [400, 110], [410, 560], [70, 640]], np.float64)
-    angled = warped(large.astype(np.uint8), fitted_homography(corners, seen), (480, 680))
+    angled = warped(picture, fitted_homography(corners, seen), (480, 680))
     (FOLDER / "at-an-angle.jpg").write_bytes(encoded(angled, ".jpg"))
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from ..geometry.arrays import Booleans, Floats
 from ..geometry.mesh import Mesh
 from ..geometry.solids_merge import Piece, merged
 from ..geometry.solids_pinch import unpinched
-from ..geometry.solids_surface import Label, triangulated
+from ..geometry.solids_surface import Label, Solid, triangulated
 from .outline import SEEN
 from .panels import rectangles
 from .remesh import Slab, on_grid
@@ -46,9 +47,40 @@ def mass(stack: Sequence[Slab], material: str) -> Mesh:
     for below, layer, above in zip([None, *stack[:-1]], stack, [*stack[1:], None], strict=True):
         _add_walls(vertices, pieces, layer, (below, above))
     points = np.array(list(vertices), dtype=np.float64)
-    solid = unpinched(merged(points, pieces))
+    solid = unpinched(_with_midpoints(merged(points, pieces)))
     found, triangles, _ = triangulated(solid)
     return Mesh("mass", found, triangles, material)
+
+
+def _with_midpoints(solid: Solid) -> Solid:
+    """Return the solid with a vertex in the middle of every edge at which four faces meet.
+
+    Where the faces on both sides hang together around both ends of such an edge, neither end
+    alone can be doubled to open it.
+    """
+    half_edges = Counter(
+        (ring[k - 1], vertex)
+        for face in solid.faces
+        for ring in face
+        for k, vertex in enumerate(ring)
+    )
+    pinched = {frozenset(edge) for edge, count in half_edges.items() if count > 1}
+    if not pinched:
+        return solid
+    first = len(solid.vertices)
+    middle = {edge: first + k for k, edge in enumerate(sorted(pinched, key=sorted))}
+    ends = np.array([sorted(edge) for edge in middle])
+    vertices = np.concatenate([solid.vertices, solid.vertices[ends].mean(axis=1)])
+    faces = tuple(tuple(_divided(ring, middle) for ring in face) for face in solid.faces)
+    return Solid(vertices, faces, solid.labels)
+
+
+def _divided(ring: tuple[int, ...], middle: Mapping[frozenset[int], int]) -> tuple[int, ...]:
+    divided = []
+    for k, vertex in enumerate(ring):
+        between = middle.get(frozenset((ring[k - 1], vertex)))
+        divided += [vertex] if between is None else [between, vertex]
+    return tuple(divided)
 
 
 def roofs(stack: Sequence[Slab], slabs: Sequence[Sequence[Slab]]) -> Iterator[tuple[int, Floats]]:

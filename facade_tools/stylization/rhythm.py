@@ -87,8 +87,8 @@ def periodic_labels(signal: Floats, step: float) -> Booleans:
     phases = np.arange(0.0, step, max(step / 64, 0.25))
     cost = [smooth[np.arange(p, n, step).astype(int)].mean() for p in phases]
     first = phases[int(np.argmin(cost))]
-    place: Floats = np.mod(np.arange(n) + 0.5 - first, step).astype(np.float64)
-    labels: Booleans = np.minimum(place, step - place) > half
+    place = np.mod(np.arange(n) + 0.5 - first, step)
+    labels: Booleans = np.asarray(np.minimum(place, step - place) > half)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], labels, [False]]))).reshape(-1, 2)
     for start, end in edges:
         if end - start < 0.6 * (1 - WALL_SHARE) * step:

@@ -1,0 +1,318 @@
+"""Retargeting: blocks side by side, storeys, overhangs, snapping, re-assignment, closed solids."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from test_stylization import BOX, style_of, textured_box
+
+from facade_tools.artifacts.blocks import Block, Blocks
+from facade_tools.artifacts.design import Canvas
+from facade_tools.artifacts.layout import Layout, LayoutShape
+from facade_tools.formats.mesh_reader import read_textured
+from facade_tools.formats.textured import joined
+from facade_tools.stylization.bases import layout_blocks, with_ends
+from facade_tools.stylization.capture import capture_style
+from facade_tools.stylization.hull import layers, mass
+from facade_tools.stylization.model import CaptureOptions
+from facade_tools.stylization.panels import panels, reassigned, rectangles
+from facade_tools.stylization.placing import foreign_blocks, placed_blocks, placed_slabs
+from facade_tools.stylization.remesh import Slab
+from facade_tools.stylization.resizing import resized
+from facade_tools.stylization.retarget import Style, retarget
+from facade_tools.stylization.wings import wings
+
+SAMPLES = Path(__file__).parent.parent / "sample_data" / "textured"
+NAMES = sorted(path.name for path in SAMPLES.iterdir())
+
+
+@pytest.fixture(scope="module")
+def styles():
+    found = {}
+    for name in NAMES:
+        capture = capture_style(read_textured(SAMPLES / name / "model.obj"), name, CaptureOptions())
+        found[name] = Style(capture.sheet, capture.blocks, capture.pictures)
+    return found
+
+
+def volume(blocks):
+    return sum(b.width * b.depth * b.height for b in blocks.blocks)
+
+
+def solid_volume(mesh):
+    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
+
+
+def closed(mesh):
+    """Whether every edge is run along once in each direction."""
+    edges = mesh.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    forth = {(a, b) for a, b in edges.tolist()}
+    return len(forth) == len(edges) and all((b, a) in forth for a, b in forth)
+
+
+# --- structure ------------------------------------------------------------------------------------
+def test_sample_buildings_have_the_structure_they_were_drawn_with(styles):
+    roles = {name: [b.role for b in style.blocks.blocks] for name, style in styles.items()}
+    assert roles["corner-house"] == ["bottom", "body", "top"]
+    assert roles["stepped-tower"] == ["bottom", "body", "body", "top"]
+    assert roles["l-block"] == ["body"] * 2
+    assert roles["u-court"] == ["bottom"] * 3 + ["body"] * 3
+    assert volume(styles["l-block"].blocks) == pytest.approx((33 * 11 + 12 * 16) * 18)
+    assert volume(styles["u-court"].blocks) == pytest.approx((40 * 12 + 2 * 11 * 16) * 13)
+
+
+def plan(*rows):
+    cells = np.array([[c == "#" for c in row] for row in rows])
+    return Slab(
+        0.0, 9.0, np.arange(cells.shape[1] + 1) * 4.0, np.arange(len(rows) + 1) * 4.0, cells
+    )
+
+
+@pytest.mark.parametrize(
+    ("rows", "count"),
+    [
+        (("####", "####"), 1),
+        (("####", "#..."), 2),  # L
+        (("####", ".#.."), 2),  # T
+        (("####", "#..#"), 3),  # U
+        (("####", "#..#", "####"), 4),  # court
+        (("#..#", "####", "#..#"), 3),  # H, whose bars are wings of the middle
+    ],
+)
+def test_plans_become_wings(rows, count):
+    slab = plan(*rows)
+    _, _, labels = wings([slab])
+    if rows[0] == "#..#":
+        assert len(np.unique(labels[slab.cells])) >= count
+    else:
+        assert len(np.unique(labels[slab.cells])) == count
+
+
+@given(st.integers(0, 2**16 - 1))
+def test_wings_share_out_every_cell(bits):
+    cells = np.array([[bits >> (4 * r + c) & 1 for c in range(4)] for r in range(4)], dtype=bool)
+    if not cells.any():
+        return
+    slab = Slab(0.0, 9.0, np.arange(5.0), np.arange(5.0), cells)
+    xs, ys, labels = wings([slab])
+    assert labels.shape == (len(ys) - 1, len(xs) - 1)
+
+
+@given(st.integers(0, 2**20 - 1))
+def test_rectangles_tile_a_mask(bits):
+    mask = np.array([[bits >> (5 * r + c) & 1 for c in range(5)] for r in range(4)], dtype=bool)
+    count = np.zeros(mask.shape, dtype=int)
+    for row, end, a, b in rectangles(mask):
+        count[row:end, a:b] += 1
+    assert (count == mask).all()
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**27 - 1))
+def test_any_stack_of_cells_is_a_closed_solid(bits):
+    cells = np.array([bits >> k & 1 for k in range(27)], dtype=bool).reshape(3, 3, 3)
+    slabs = [
+        Slab(3.0 * z, 3.0 * z + 3, np.array([0.0, 2, 5, 6]), np.array([0.0, 3, 4, 8]), cells[z])
+        for z in range(3)
+        if cells[z].any()
+    ]
+    if not slabs:
+        return
+    body = mass(layers(slabs), "mass")
+    assert closed(body)
+    assert solid_volume(body) == pytest.approx(sum(s.area * s.height for s in slabs), rel=1e-3)
+
+
+# --- onto itself, and onto others -----------------------------------------------------------------
+@pytest.mark.parametrize("name", NAMES)
+def test_every_scene_has_its_closed_mass(styles, name):
+    for base in (styles[name].blocks, styles["u-court"].blocks):
+        body = retarget(styles[name], base).meshes[0]
+        assert body.name == "mass"
+        assert closed(body)
+        assert solid_volume(body) == pytest.approx(volume(base), rel=0.02)
+
+
+def test_faces_between_wings_are_hidden_until_a_wing_stands_alone(styles):
+    style = styles["l-block"]
+    whole = retarget(style, style.blocks)
+    area = sum(wall_area(mesh) for mesh in whole.meshes if "/" in mesh.name)
+    assert area == pytest.approx((33 + 27) * 2 * 18 + 33 * 11 + 12 * 16, rel=1e-2)
+    alone = retarget(style, replace(style.blocks, blocks=style.blocks.blocks[1:]))
+    sides = {mesh.name.split("/")[1] for mesh in alone.meshes if "/" in mesh.name}
+    assert sides == {"front", "right", "back", "left", "roof"}
+
+
+def wall_area(mesh):
+    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+    return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
+
+
+def test_storeys_are_inserted_not_stretched():
+    """Six storeys with a ledge each, to a house half as high again: nine storeys."""
+    parts = []
+    for k in range(6):
+        parts.append(textured_box((0, 0, 3 * k), (16, 10, 3 * k + 2.4)))
+        parts.append(textured_box((0.4, 0.4, 3 * k + 2.4), (15.6, 9.6, 3 * k + 3)))
+    style = style_of(joined(parts))
+    assert len(style.blocks.blocks) == 1
+    own = style.blocks.blocks[0]
+    for height, storeys in ((18, 6), (27, 9), (12, 4), (28, 9)):
+        target = replace(style.blocks, blocks=(replace(own, height=height),))
+        placed = placed_blocks(style.sheet, style.blocks, target)[0]
+        assert len(placed.storeys) == 2 * storeys
+        heights = [s.top - s.bottom for s in placed.storeys]
+        assert heights[::2] == pytest.approx([2.4 * height / (3 * storeys)] * storeys)
+        assert placed.storeys[-1].top == pytest.approx(own.z + height)
+
+
+# --- overhangs, snapping, re-assignment -----------------------------------------------------------
+def recessed():
+    """A block with a recess 2 m deep in the middle of its front, under nothing."""
+    return joined(
+        [textured_box((0, 2, 0), (20, 12, 9)), textured_box((0, 0, 0), (7, 2, 9)),
+         textured_box((13, 0, 0), (20, 2, 9))]
+    )  # fmt: skip
+
+
+def stacked(inset):
+    return Blocks(
+        "two",
+        (
+            Block("low", "body", 0, 0, 0, 20, 12, 9, 3),
+            Block("high", "body", 2, inset, 9, 16, 12 - 2 * inset, 9, 3),
+        ),
+    )
+
+
+@pytest.mark.parametrize(("inset", "depth"), [(1.0, 0.9), (3.0, 2.0), (0.0, 0.0)])
+def test_walls_under_an_overhang_are_thinned(monkeypatch, inset, depth):
+    """Upper outer boundary 1 m behind the lower's: the recess goes from 2 m to 0.9 of that."""
+    monkeypatch.setattr("facade_tools.stylization.wings.COMPACT", 0.0)
+    style = style_of(recessed(), front=180.0)
+    assert len(style.blocks.blocks) == 1
+    low = placed_blocks(style.sheet, style.blocks, stacked(inset))[0]
+    slab = placed_slabs(style.sheet, low)[0]
+    back = [y for y in slab.ys if 1e-6 < y < 6]
+    assert back == (pytest.approx([depth]) if depth else [])
+
+
+def test_edges_snap_to_those_below(monkeypatch):
+    """A recess of other proportions on the block above moves onto the one below."""
+    monkeypatch.setattr("facade_tools.stylization.wings.COMPACT", 0.0)
+    style = style_of(recessed(), front=180.0)
+    base = Blocks(
+        "two",
+        (
+            Block("low", "body", 0, 0, 0, 20, 12, 9, 3),
+            Block("high", "body", 1, 0, 9, 19, 12, 9, 3),
+        ),
+    )
+    low, high = placed_blocks(style.sheet, style.blocks, base)
+    below, above = (placed_slabs(style.sheet, p)[0] for p in (low, high))
+    if len(below.xs) > 2:
+        assert set(above.xs[1:-1]) <= set(below.xs) | {1.0}
+    assert above.xs[0] == 1
+    assert above.xs[-1] == 20
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_model_on_its_own_blocks_is_neither_thinned_nor_snapped(styles, name):
+    style = styles[name]
+    for factor in (1.0, 1.5):
+        sizes = {b.id: (factor * b.width, factor * b.depth, b.height) for b in style.blocks.blocks}
+        placed = placed_blocks(style.sheet, style.blocks, resized(style.blocks, sizes))
+        assert foreign_blocks(style.blocks, placed) == []
+        assert all(len(knots[0]) == 2 for p in placed for knots in p.maps)
+
+
+def test_small_groups_take_the_texture_of_large_ones():
+    style = style_of(BOX, front=180.0)
+    own = style.blocks.blocks[0]
+    base = Blocks(
+        "x",
+        (
+            replace(own, id="low", x=0, y=0, z=0),
+            replace(own, id="high", x=0, y=1.0, z=own.height, height=0.5, depth=own.depth - 1),
+        ),
+    )
+    placed = placed_blocks(style.sheet, style.blocks, base)
+    slabs = [placed_slabs(style.sheet, p) for p in placed]
+    found = panels(style.sheet, placed, slabs)
+    tops = [k for k, p in enumerate(found) if p.block == 1]
+    changed = [replace(p, group="tiny", texture="other") if p.block == 1 else p for p in found]
+    done = reassigned(changed, [1], 0.2)
+    assert all(done[k].texture != "other" for k in tops if done[k].side in ("front", "back"))
+    assert reassigned(changed, [1], 0.0) == changed
+    assert reassigned(changed, [], 0.2) == changed
+
+
+# --- bases ----------------------------------------------------------------------------------------
+def test_resizing_keeps_neighbours_together(styles):
+    blocks = styles["l-block"].blocks
+    first = blocks.blocks[0]
+    wide = {first.id: (first.width + 9, first.depth + 6, first.height)}
+    before, after = blocks.blocks, resized(blocks, wide).blocks
+    overlap = [
+        min(a.x + a.width, b.x + b.width) - max(a.x, b.x) > 1e-6
+        and min(a.y + a.depth, b.y + b.depth) - max(a.y, b.y) > 1e-6
+        for a, b in (after[:2],)
+    ]
+    assert overlap == [False]
+    assert after[0].width == first.width + 9
+    assert after[1].width == before[1].width
+
+
+def test_set_backs_stay_in_place_when_all_grow(styles):
+    blocks = styles["stepped-tower"].blocks
+    double = {b.id: (2 * b.width, 2 * b.depth, b.height) for b in blocks.blocks}
+    grown = resized(blocks, double).blocks
+    middles = {(b.x + b.width / 2, b.y + b.depth / 2) for b in grown}
+    assert len({(round(x, 6), round(y, 6)) for x, y in middles}) == 1
+
+
+def test_plain_bases_get_the_bottom_and_top_of_the_style(styles):
+    plain = Blocks("b", (Block("main", "body", 0, 0, 0, 20, 12, 30, 10),))
+    ends = with_ends(plain, styles["corner-house"].blocks)
+    assert [(b.role, b.height) for b in ends.blocks] == [
+        ("bottom", 4.0), ("body", 23.5), ("top", 2.5),
+    ]  # fmt: skip
+    low = Blocks("b", (Block("main", "body", 0, 0, 0, 20, 12, 6, 2),))
+    assert with_ends(low, styles["corner-house"].blocks) == low
+    given_roles = styles["stepped-tower"].blocks
+    assert with_ends(given_roles, styles["corner-house"].blocks) is given_roles
+
+
+def test_a_layout_is_a_house_front_with_its_bays():
+    shapes = (
+        LayoutShape("bay", ("A", "B"), 2.0, 0.0, 6.0, 8.0, 1.2),
+        LayoutShape("sill", ("A", "B"), 8.0, 1.0, 9.0, 1.2, 0.2),
+        LayoutShape("hidden", ("A", "B"), 8.0, 0.0, 12.0, 9.0, 2.0, visible=False),
+    )
+    blocks = layout_blocks(Layout("front", Canvas(12.0, 9.0), {}, {}, shapes)).blocks
+    assert [b.id for b in blocks] == ["canvas", "bay-0"]
+    assert (blocks[1].y, blocks[1].depth, blocks[1].height) == (-1.2, 1.2, 8.0)
+
+
+def test_several_styles_and_the_same_bytes_again(facade, tmp_path):
+    for name in ("corner-house", "u-court"):
+        done = facade("capture-style", SAMPLES / name / "model.obj", "-o", tmp_path / name)
+        assert done.returncode == 0, done.stderr
+    block = {"role": "body", "x": 0, "y": 0, "z": 0, "width": 18, "depth": 9, "height": 9}
+    blocks = [block | {"id": "a", "floors": 3}]
+    base = {"schema": "facade-tools/blocks/1", "id": "b", "blocks": blocks}
+    (tmp_path / "b.json").write_text(json.dumps(base))
+    for run in ("1", "2"):
+        done = facade(
+            "retarget", tmp_path / "corner-house", tmp_path / "b.json",
+            "--styles", tmp_path / "u-court", "--seed", "3", "-o", tmp_path / run / "b.glb",
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+    assert (tmp_path / "1/b.glb").read_bytes() == (tmp_path / "2/b.glb").read_bytes()

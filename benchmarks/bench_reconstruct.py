@@ -74,13 +74,14 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("parses", nargs="+")
     parser.add_argument("--images", type=Path, required=True)
+    parser.add_argument("--skip", type=int, default=0)  # parses before those that are done
     parser.add_argument("--limit", type=int, default=10**6)
     parser.add_argument("--work", type=Path, default=Path("build/reconstruct"))
     parser.add_argument("--sheet", type=Path)
     args = parser.parse_args()
     cv2.setNumThreads(1)
     args.work.mkdir(parents=True, exist_ok=True)
-    parses = list(read(args.parses, "parse"))[: args.limit]
+    parses = list(read(args.parses, "parse"))[args.skip :][: args.limit]
     drawn = {parse.id for parse in parses[:: max(1, len(parses) // 20)][:20]}
     files, cells, spent, sizes = [], [], [], []
     watertight = sound = whole = 0

@@ -141,12 +141,12 @@ def test_joined_tiles_keep_their_middles():
     assert [int(strip[0, 14 * k + 7, 0]) for k in range(3)] == [10, 100, 200]
 
 
-def test_the_largest_square_of_free_pixels():
+def test_the_largest_rectangle_of_free_pixels():
     free = np.zeros((20, 30), bool)
+    assert largest_rectangle(free) == (0, 0, 0, 0)
     free[3:9, 10:25] = True
-    y0, x0, y1, x1 = largest_rectangle(free)
-    assert (y1 - y0, x1 - x0) == (6, 6)
-    assert free[y0:y1, x0:x1].all()
+    free[9:20, 2:4] = True
+    assert largest_rectangle(free) == (3, 10, 9, 25)
 
 
 # --- buildings ------------------------------------------------------------------------------------

@@ -45,10 +45,10 @@ def transformed(shape: Shape, operation: Operation, measure: Measure) -> Shape:
         shape = upright(shape)
     if operation.translate:
         shape = _translated(shape, operation.translate, measure)
-    if operation.rotate:
-        shape = _rotated(shape, operation.rotate, measure)
     if operation.scale:
         shape = _scaled(shape, operation.scale, measure)
+    if operation.rotate:
+        shape = _rotated(shape, operation.rotate, measure)
     if operation.extrude is not None:
         shape = extruded(shape, measure.number(operation.extrude))
     return shape

@@ -217,17 +217,27 @@ def _exemplars(canvas: Canvas, label: int) -> Iterator[Picture]:
 
 
 def largest_rectangle(free: NDArray[np.bool_]) -> tuple[int, int, int, int]:
-    """Return top, left, bottom, right of the largest rectangle of true pixels by its shorter side.
+    """Return top, left, bottom, right of the rectangle that the largest square of trues grows to.
 
     >>> largest_rectangle(np.array([[1, 1, 0], [1, 1, 1]], bool))
     (0, 0, 2, 2)
     """
-    side = np.zeros((free.shape[0] + 1, free.shape[1] + 1), np.int64)
-    for y, x in np.argwhere(free).tolist():
-        side[y + 1, x + 1] = 1 + min(side[y, x], side[y, x + 1], side[y + 1, x])
-    most = int(side.max())
-    y, x = (int(k) for k in np.unravel_index(int(np.argmax(side)), side.shape))
-    return y - most, x - most, y, x
+    inside = np.pad(free.astype(np.uint8), 1)
+    reach = np.round(cv2.distanceTransform(inside, cv2.DIST_C, 3)[1:-1, 1:-1]).astype(np.int64)
+    y, x = (int(k) for k in np.unravel_index(int(np.argmax(reach)), reach.shape))
+    half = int(reach[y, x])
+    if half == 0:
+        return y, x, y, x
+    y0, x0, y1, x1 = y - half + 1, x - half + 1, y + half, x + half
+    while y1 < free.shape[0] and free[y1, x0:x1].all():
+        y1 += 1
+    while y0 > 0 and free[y0 - 1, x0:x1].all():
+        y0 -= 1
+    while x1 < free.shape[1] and free[y0:y1, x1].all():
+        x1 += 1
+    while x0 > 0 and free[y0:y1, x0 - 1].all():
+        x0 -= 1
+    return y0, x0, y1, x1
 
 
 def _resampled(picture: Picture, factor: float) -> Picture:

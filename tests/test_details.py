@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import replace
+from itertools import permutations
 
 import catalogue
 import numpy as np
@@ -17,7 +18,8 @@ from facade_tools.artifacts.building import Box, Building, Chimney, Element, Fac
 from facade_tools.errors import InvalidInput
 from facade_tools.geometry.detail_boxes import box_triangles, side_frame
 from facade_tools.geometry.detail_cladding import wall_pattern
-from facade_tools.geometry.detail_roofs import THICKNESS, roof_slabs
+from facade_tools.geometry.detail_overhangs import trimmed
+from facade_tools.geometry.detail_roofs import THICKNESS, _slabs, roof_slabs
 from facade_tools.geometry.detail_volumes import porch, prism
 from facade_tools.geometry.details import (
     building_scene,
@@ -26,6 +28,7 @@ from facade_tools.geometry.details import (
     signed_volume,
 )
 from facade_tools.geometry.openings import openings_of, pierced
+from facade_tools.geometry.polygons import shape_of
 from facade_tools.geometry.scenes import bounds, shifts
 from facade_tools.geometry.solids import building_solid, triangulated
 
@@ -170,6 +173,48 @@ def catalogue_area(building):
         for b in building.boxes
     ]
     return shapely.unary_union(plans).area
+
+
+def random_house(rng: np.random.Generator) -> Building:
+    boxes = []
+    for k in range(int(rng.integers(2, 5))):
+        place, size = np.round(rng.uniform(-5, 5, 2)), np.round(rng.uniform(3, 11, 2))
+        roof = Roof(
+            str(rng.choice(("flat", "gable", "hip", "shed"))), float(rng.choice((25.0, 40.0))),
+            str(rng.choice(("x", "y"))), 0.5,
+        )  # fmt: skip
+        height = float(rng.choice((3.0, 3.4, 6.0)))
+        boxes.append(Box(f"b{k}", "general", *place.tolist(), *size.tolist(), height, roof))
+    return Building("h", tuple(boxes))
+
+
+def test_no_overhang_runs_into_another_part_of_the_roof():
+    rng = np.random.default_rng(5)
+    met = 0
+    for _ in range(60):
+        building = random_house(rng)
+        solid = building_solid(building)
+        slabs = list(_slabs(solid, {box.id: 0.5 for box in building.boxes}))
+        left = trimmed(slabs, THICKNESS)
+        shapes = [shapely.union_all([shape_of(rings) for rings in parts]) for parts in left]
+        met += sum(len(p) != 1 or p[0] is not s.rings for p, s in zip(left, slabs, strict=True))
+        for (a, mine), (b, other) in permutations(zip(slabs, shapes, strict=True), 2):
+            assert mine.buffer(1e-4).covers(a.face)
+            for x, y in points_in(mine.difference(a.face.buffer(2e-3)).intersection(other), rng):
+                rise = np.subtract(b.plane, a.plane) @ (x, y, 1.0)
+                # Below another's own roof is inside the mass; between overhangs, one goes on.
+                inside = shapely.intersects_xy(b.face.buffer(-2e-3), x, y)
+                assert not (inside and rise > 1e-3), building
+                assert inside or abs(rise) > 1e-3, building
+    assert met > 20
+
+
+def points_in(shape, rng):
+    if shape.area < 1e-2:
+        return []
+    x0, y0, x1, y1 = shape.bounds
+    points = rng.uniform((x0, y0), (x1, y1), (30, 2))
+    return points[shapely.contains_xy(shape.buffer(-2e-3), *points.T)]
 
 
 def test_slab_of_a_gable_meets_at_its_ridge_and_follows_its_slope():

@@ -71,6 +71,20 @@ def test_cone_has_its_apex_in_the_middle() -> None:
     assert top == pytest.approx([2, 2, 4 + 2 * math.tan(math.radians(60))])
 
 
+def test_a_tower_stands_out_of_a_roof_at_its_own_height() -> None:
+    house = catalogue.box("a", (0, 0, 12, 10), 6, roof=catalogue.roofed("hip", 45))
+    tower = catalogue.box("t", (-1, -1, 3, 3), 6, roof=catalogue.roofed("cone", 60))
+    apart = catalogue.box("t", (20, 0, 24, 4), 6, roof=catalogue.roofed("cone", 60))
+    rise = 2 * math.tan(math.radians(60))
+    patches = union_patches([house, tower])
+    # The house's roof stands 1 m above the eaves over the tower's middle.
+    assert height(patches, 1.0, 1.0) == pytest.approx(7.0 + rise)
+    assert as_mesh(building_solid(Building("b", (house, tower)))).is_volume
+    assert height(union_patches([house, apart]), 22.0, 2.0) == pytest.approx(6.0 + rise)
+    low = catalogue.box("t", (-1, -1, 3, 3), 3, roof=catalogue.roofed("cone", 60))
+    assert max(p.plane[2] for p in union_patches([house, low]) if p.owner == "t") < 30.0
+
+
 # --- unions of boxes ------------------------------------------------------------------------------
 def test_touching_hips_are_the_roof_of_their_outline() -> None:
     boxes = catalogue.plan_building("L", catalogue.roofed("hip")).boxes
@@ -192,6 +206,19 @@ def test_gable_ignores_a_small_jog() -> None:
     ring = [(0, 0), (12, 0), (12, 3), (12.2, 3), (12.2, 6), (0, 6)]
     patches = sloped_patches(oriented([ring]), 3.0, catalogue.roofed("gable", 40, "x"))
     assert len(patches) == 2
+
+
+def test_a_square_plan_with_a_slit_still_gets_its_gables() -> None:
+    outline = [(0, 0), (10, 0), (10, 5), (9.8, 5.1), (10, 5.2), (10, 10), (0, 10)]
+    slit = [(9.7, 5.05), (9.8, 5.1), (9.7, 5.15)]  # touches the outline
+    for direction in ("x", "y"):
+        roof = catalogue.roofed("gable", 40, direction)
+        (rings,) = sound([outline, slit])
+        patches = sloped_patches(rings, 3.0, roof)
+        axis = 0 if direction == "x" else 1
+        along = [p for p in patches if abs(p.plane[axis]) < 0.1]
+        area = sum(shape_of(patch.rings).area for patch in along)
+        assert area > 0.7 * shape_of(rings).area  # of a hip half
 
 
 def test_truncation_cuts_at_one_height() -> None:

@@ -10,10 +10,13 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 
 from .arrays import Floats, Points2, Points3, Triangles
+from .detail_overhangs import Slab, exposed_edges, trimmed
 from .mesh import Mesh
 from .patterns import pattern_uv
+from .polygons import shape_of
 from .solids import Solid
 from .triangulate import newell_normal, triangulate_rings
 
@@ -48,24 +51,36 @@ def roof_slabs(solid: Solid, overhang: Mapping[str, float], name: str = "roof") 
 
     overhang: metres by owner of the face; an owner that is not listed has none.
     """
-    neighbours = _neighbours(solid)
+    slabs = list(_slabs(solid, overhang))
     tops, edges = _Collected(), _Collected()
+    for slab, parts in zip(slabs, trimmed(slabs, THICKNESS), strict=True):
+        for rings in parts:
+            flat = np.concatenate(rings)
+            triangles = triangulate_rings(rings)
+            raised = _lifted(flat, slab.plane, THICKNESS)
+            tops.add(raised, triangles, pattern_uv(PATTERN, raised, _normal(slab.plane)))
+            edges.add(_lifted(flat, slab.plane, 0.0), triangles[:, ::-1])
+            exposed = exposed_edges(slab, rings)
+            edges.add(*_fascia([_lifted(ring, slab.plane, 0.0) for ring in rings], exposed))
+    return [tops.mesh(name, "roof"), edges.mesh(name, "fascia")]
+
+
+def _slabs(solid: Solid, overhang: Mapping[str, float]) -> Iterator[Slab]:
+    """Yield the slab over each roof face, before it meets the others."""
+    neighbours = _neighbours(solid)
     for index, (face, label) in enumerate(zip(solid.faces, solid.labels, strict=True)):
         if label.semantic != "roof":
             continue
-        plane = _plane(solid.vertices[list(face[0])])
-        rings = []
+        rings, lines = [], []
         for ring in face:
             borders = list(_borders(solid, index, ring, neighbours, overhang.get(label.owner, 0.0)))
             outline, exposed = grown(borders)
+            ends = np.stack([outline, np.roll(outline, -1, axis=0)], axis=1)
+            lines.append(ends[exposed])
             rings.append(outline)
-            edges.add(*_fascia(_lifted(outline, plane, 0.0), exposed))
-        flat = np.concatenate(rings)
-        triangles = triangulate_rings(rings)
-        raised = _lifted(flat, plane, THICKNESS)
-        tops.add(raised, triangles, pattern_uv(PATTERN, raised, _normal(plane)))
-        edges.add(_lifted(flat, plane, 0.0), triangles[:, ::-1])
-    return [tops.mesh(name, "roof"), edges.mesh(name, "fascia")]
+        shape = shape_of([solid.vertices[list(ring)][:, :2] for ring in face])
+        edges = shapely.MultiLineString(list(np.concatenate(lines)))
+        yield Slab(_plane(solid.vertices[list(face[0])]), shape, rings, edges)
 
 
 class _Collected:
@@ -177,10 +192,10 @@ def _corner(before: Border, after: Border) -> list[Floats]:
     return [first, second]
 
 
-def _fascia(low: Points3, exposed: list[bool]) -> tuple[Points3, Triangles]:
+def _fascia(rings: list[Points3], exposed: list[bool]) -> tuple[Points3, Triangles]:
     """Return upright quads of the slab's thickness along the exposed edges."""
-    start = low[exposed]
-    end = np.roll(low, -1, axis=0)[exposed]
+    start = np.concatenate(rings)[exposed]
+    end = np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])[exposed]
     rise = np.array([0.0, 0.0, THICKNESS])
     vertices = np.stack([start, end, end + rise, start + rise], axis=1).reshape(-1, 3)
     quads = 4 * np.arange(len(start), dtype=np.int64)[:, None, None]

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import shapely
 
 from facade_tools.artifacts.building import Axis
 
 from .arrays import Floats, Points2
-from .polygons import Rings
+from .polygons import Rings, signed_area
 from .skeleton import Contour, SkeletonFailed, straight_skeleton
 
 PLAIN = 0.4  # metres: jogs and bends of a wall that its gable ignores
+ACROSS = 0.5  # cosine of the angle between an end and the ridge: steeper ones it runs into
+LEAST_COURT = 1.0  # m²: a hole smaller than this is ignored likewise
 OPPOSITE = -0.8  # cosine of the angle between the two walls beside a gable
 
 
@@ -22,28 +26,45 @@ def turns(contour: Contour) -> Floats:
     return np.asarray(along[:, 0] * after[:, 1] - along[:, 1] * after[:, 0])
 
 
+@dataclass(frozen=True, slots=True)
+class Ends:
+    """Ends of a plan, edges of each: those that get a gable, and those that may."""
+
+    sure: list[list[int]]
+    possible: list[list[int]]
+
+
 def gable_edges(rings: Rings, direction: Axis) -> list[int]:
-    """Return the edges that get a gable, numbered over the concatenated rings.
+    """Return the edges that get a gable, numbered over the concatenated rings."""
+    return [edge for end in gable_ends(rings, direction).sure for edge in end]
+
+
+def gable_ends(rings: Rings, direction: Axis) -> Ends:
+    """Return the ends with gables, their edges numbered over the concatenated rings.
 
     They are found on the plan without jogs smaller than 0.4 m: ends whose hip is a triangle
     between walls that face each other. Where several meet, those come first that the ridge's
-    direction runs into.
+    direction runs into. An end across the ridge that is longer than all these but has another
+    hip, as plans have that are about as long as wide, may get a gable too.
     """
     kept = [_corners(ring) for ring in rings]
+    plain = [
+        ring[corners] if ring is rings[0] or abs(signed_area(ring)) > LEAST_COURT else None
+        for ring, corners in zip(rings, kept, strict=True)
+    ]
     try:
-        ends = _ends([ring[k] for ring, k in zip(rings, kept, strict=True)], direction)
+        ends = _ends([ring for ring in plain if ring is not None], direction)
     except SkeletonFailed:
-        return []
-    edges: list[int] = []
-    first = first_kept = 0
-    for ring, corners in zip(rings, kept, strict=True):
-        for place, corner in enumerate(corners):
-            if first_kept + place in ends:
+        return Ends([], [])
+    edges: list[list[int]] = []
+    first = 0
+    for ring, corners, used in zip(rings, kept, plain, strict=True):
+        if used is not None:
+            for place, corner in enumerate(corners):
                 step = (corners[(place + 1) % len(corners)] - corner) % len(ring)
-                edges += [first + (corner + k) % len(ring) for k in range(step)]
+                edges.append([first + (corner + k) % len(ring) for k in range(step)])
         first += len(ring)
-        first_kept += len(corners)
-    return edges
+    return Ends(*([edges[k] for k in numbers] for numbers in ends))
 
 
 def _corners(ring: Points2) -> list[int]:
@@ -59,8 +80,8 @@ def _corners(ring: Points2) -> list[int]:
     return places if len(places) >= 3 else list(range(len(ring)))
 
 
-def _ends(rings: Rings, direction: Axis) -> set[int]:
-    """Return the edges of a plain polygon that get a gable."""
+def _ends(rings: Rings, direction: Axis) -> tuple[list[int], list[int]]:
+    """Return the edges of a plain polygon that get a gable, and those that may, best first."""
     contour = Contour.of(rings)
     faces = straight_skeleton(rings).faces
     along, _, _ = contour.frames()
@@ -68,12 +89,23 @@ def _ends(rings: Rings, direction: Axis) -> set[int]:
     before[contour.following] = np.arange(len(along))
     facing = np.sum(along[before] * along[contour.following], axis=1) < OPPOSITE
     turn = turns(contour)
-    convex = (turn > 1e-6) & (turn[before] > 1e-6)
+    ends = facing & (turn > 1e-6) & (turn[before] > 1e-6)
     small = np.array([len(face) == 3 or len(along) == 4 for face in faces])
     across = np.round(np.abs(along[:, 0 if direction == "x" else 1]), 6)
-    chosen: set[int] = set()
-    for k in np.argsort(across, kind="stable").tolist():
-        beside = {int(before[k]), int(contour.following[k])}
-        if facing[k] and convex[k] and small[k] and not beside & chosen:
-            chosen.add(k)
+    length = np.hypot(*(contour.points[contour.following] - contour.points).T)
+    ahead, beside = contour.following.tolist(), before.tolist()
+    order = [k for k in np.argsort(across, kind="stable").tolist() if (ends & small)[k]]
+    sure = _apart(order, ahead, beside)
+    longest = max((float(length[k]) for k in sure), default=0.0)
+    others = ends & ~small & (across < ACROSS) & (length > longest)
+    order = [k for k in np.argsort(-np.round(length, 3), kind="stable").tolist() if others[k]]
+    return sure, [k for k in _apart([*sure, *order], ahead, beside) if k not in sure]
+
+
+def _apart(order: list[int], ahead: list[int], beside: list[int]) -> list[int]:
+    """Return the edges, in order, that are no neighbours of one before them."""
+    chosen: list[int] = []
+    for edge in order:
+        if ahead[edge] not in chosen and beside[edge] not in chosen:
+            chosen.append(edge)
     return chosen

@@ -11,7 +11,7 @@ from facade_tools.artifacts.building import Roof
 from facade_tools.artifacts.footprint import Footprint
 
 from .polygons import Rings, rings_of, sound
-from .roofs_gables import gable_edges, turns
+from .roofs_gables import gable_ends, turns
 from .roofs_patch import FLAT, Patch, Plane, mansard_profile, slope_of
 from .skeleton import Contour, Skeleton, SkeletonFailed, straight_skeleton
 
@@ -105,15 +105,29 @@ def _pyramid(contour: Contour, eaves: float, rise: float) -> list[Patch]:
 def _gabled(
     rings: Rings, contour: Contour, skeleton: Skeleton, roof: Roof
 ) -> tuple[Contour, Skeleton]:
-    """Return contour and skeleton with gables at the ends; hipped where that has no roof."""
-    ends = gable_edges(rings, roof.direction)
-    speeds = np.ones(len(contour.points))
-    speeds[ends] = 0.0
+    """Return contour and skeleton with gables at as many ends as have a roof together."""
+    ends = gable_ends(rings, roof.direction)
+    chosen = [edge for end in ends.sure for edge in end]
+    gabled = _with_gables(rings, chosen) if chosen else None
+    tried = ends.possible
+    if gabled is None:
+        chosen, tried = [], [*ends.sure, *ends.possible]
+    for end in tried:
+        found = _with_gables(rings, [*chosen, *end])
+        if found is not None:
+            gabled, chosen = found, [*chosen, *end]
+    return gabled or (contour, skeleton)
+
+
+def _with_gables(rings: Rings, edges: list[int]) -> tuple[Contour, Skeleton] | None:
+    """Return contour and skeleton with upright faces over edges; None where they have no roof."""
+    speeds = np.ones(sum(map(len, rings)))
+    speeds[edges] = 0.0
     try:
         return Contour.of(rings, speeds), straight_skeleton(rings, speeds)
     except SkeletonFailed:
-        LOG.info("no roof with gables at edges %s: hipped instead", ends)
-        return contour, skeleton
+        LOG.debug("no roof with gables at edges %s", edges)
+        return None
 
 
 # --- mansards -------------------------------------------------------------------------------------

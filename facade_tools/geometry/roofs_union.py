@@ -10,7 +10,7 @@ import shapely
 
 from facade_tools.artifacts.building import Box, Roof
 
-from .polygons import rings_of
+from .polygons import rings_of, shape_of
 from .roofs_box import Sides, box_roof, rectangle_of, sloping_sides
 from .roofs_patch import FLAT, Patch, Rectangle
 from .roofs_polygon import sloped_patches
@@ -51,6 +51,17 @@ def union_patches(boxes: Sequence[Box]) -> list[Patch]:
     height that touch are one roof over their common outline.
     """
     wings = [_Wing.of(box) for box in boxes]
+    spires = [wing for wing in wings if wing.roof.style == "cone"]
+    wings = [wing for wing in wings if wing.roof.style != "cone"]
+    patches = _ordinary(wings)
+    for spire in spires:
+        rectangle = _lifted(spire, wings, patches)
+        patches += box_roof(rectangle, spire.roof, spire.id, len(patches))
+    return patches
+
+
+def _ordinary(wings: list[_Wing]) -> list[Patch]:
+    """Return the patches of all roofs that are no spires."""
     patches: list[Patch] = []
     covered: dict[str, shapely.Geometry] = {}
     for members in _groups(wings):
@@ -63,6 +74,24 @@ def union_patches(boxes: Sequence[Box]) -> list[Patch]:
             if wing.id not in covered or not shapely.covers(covered[wing.id], _shape(rectangle)):
                 patches += box_roof(rectangle, wing.roof, wing.id, len(patches), sides)
     return patches
+
+
+# --- spires ---------------------------------------------------------------------------------------
+def _lifted(spire: _Wing, wings: list[_Wing], patches: list[Patch]) -> Rectangle:
+    """Return the rectangle of a tower, raised where a roof beside it would swallow its spire.
+
+    Its walls go on up to where that roof stands above the tower's middle; only roofs count whose
+    eaves are not higher than the tower's.
+    """
+    r = spire.rectangle
+    x, y = (r.x0 + r.x1) / 2, (r.y0 + r.y1) / 2
+    low = {wing.id for wing in wings if wing.rectangle.eaves <= r.eaves + SAME}
+    heights = [
+        patch.plane[0] * x + patch.plane[1] * y + patch.plane[2]
+        for patch in patches
+        if patch.owner in low and shapely.intersects_xy(shape_of(patch.rings), x, y)
+    ]
+    return replace(r, eaves=round(max([r.eaves, *heights]), 6))
 
 
 def _shape(r: Rectangle) -> shapely.Polygon:

@@ -10,10 +10,12 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 
 import numpy as np
+import shapely
 
-from .arrays import Floats, Points3
+from .arrays import Floats, Points2, Points3
+from .polygons import signed_area
 from .solids_surface import Face, Solid
-from .triangulate import newell_normal
+from .triangulate import flattened, newell_normal
 
 NUDGE = 1e-4  # metres
 Edge = tuple[int, int]
@@ -26,6 +28,8 @@ def unpinched(solid: Solid) -> Solid:
     pinched = {edge for edge, corners in edges.items() if len(corners) > 1}
     if not pinched:
         return solid
+    solid = _resewn(solid, {vertex for edge in pinched for vertex in edge})
+    edges = _half_edges(solid.faces)
     normals = [_unit(newell_normal(solid.vertices[list(face[0])])) for face in solid.faces]
     parent: dict[Corner, Corner] = {}
     for edge, corners in edges.items():
@@ -34,6 +38,74 @@ def unpinched(solid: Solid) -> Solid:
             _unite(parent, corner, _following(solid.faces, partner))
             _unite(parent, _following(solid.faces, corner), partner)
     return _opened(solid, normals, parent, {k for edge in pinched for k in edge})
+
+
+def _resewn(solid: Solid, pinched: set[int]) -> Solid:
+    """Return the solid with rings whose every corner at a pinched vertex is one wedge of its face.
+
+    Where a hole touches the outer ring, the corner of neither is: each runs over into the other.
+    """
+    faces: list[Face] = []
+    labels = []
+    for face, label in zip(solid.faces, solid.labels, strict=True):
+        visits = Counter(vertex for ring in face for vertex in ring)
+        if any(count > 1 and vertex in pinched for vertex, count in visits.items()):
+            parts = _sewn(solid.vertices, face, {v for v, count in visits.items() if count > 1})
+            faces += parts
+            labels += [label] * len(parts)
+        else:
+            faces.append(face)
+            labels.append(label)
+    return Solid(solid.vertices, tuple(faces), tuple(labels))
+
+
+def _sewn(vertices: Points3, face: Face, shared: set[int]) -> list[Face]:
+    """Return a face, or several, with the same edges, linked by angle at the shared vertices."""
+    normal = newell_normal(vertices[list(face[0])])
+    plan = flattened(vertices, normal)
+    edges = [(a, b) for ring in face for a, b in zip(ring, ring[1:] + ring[:1], strict=True)]
+    leaving: dict[int, list[Edge]] = defaultdict(list)
+    for edge in edges:
+        leaving[edge[0]].append(edge)
+    following = {}
+    for a, b in edges:
+        choices = leaving[b]
+        if b in shared:
+            back = plan[a] - plan[b]
+            choices = sorted(choices, key=lambda edge: _clockwise(back, plan[edge[1]] - plan[b]))
+        following[a, b] = choices[0]
+    rings = []
+    left = dict.fromkeys(edges)
+    while left:
+        edge = next(iter(left))
+        ring = []
+        while edge in left:
+            del left[edge]
+            ring.append(edge[0])
+            edge = following[edge]
+        rings.append(tuple(ring))
+    return _with_holes(plan, rings)
+
+
+def _clockwise(first: Floats, second: Floats) -> float:
+    """Return the angle clockwise from one direction to another, in (0, 2π]."""
+    turn = np.arctan2(first[0] * second[1] - first[1] * second[0], first @ second)
+    angle = float(-turn % (2 * np.pi))
+    return angle if angle > 1e-12 else 2 * np.pi
+
+
+def _with_holes(plan: Points2, rings: list[tuple[int, ...]]) -> list[Face]:
+    """Return the faces that rings make: outer ones, each with the holes inside it."""
+    areas = [signed_area(plan[list(ring)]) for ring in rings]
+    outer = [ring for ring, area in zip(rings, areas, strict=True) if area > 0]
+    found: list[Face] = [(ring,) for ring in outer]
+    shapes = [shapely.make_valid(shapely.Polygon(plan[list(ring)])) for ring in outer]
+    for ring, area in zip(rings, areas, strict=True):
+        if area <= 0:
+            shared = [shapely.Polygon(plan[list(ring)]).intersection(s).area for s in shapes]
+            home = int(np.argmax(shared))
+            found[home] = (*found[home], ring)
+    return found
 
 
 def _half_edges(faces: tuple[Face, ...]) -> dict[Edge, list[Corner]]:

@@ -40,14 +40,23 @@ def triangulate_rings(rings: Sequence[Points2]) -> Triangles:
     points = points - points.min(axis=0)
     found = np.asarray(mapbox_earcut.triangulate_float64(points, ends), dtype=np.int64)
     triangles = found.reshape(-1, 3)
-    if len(triangles) != len(points) + 2 * len(rings) - 4 or not _covers(points, ends, triangles):
-        order = _counter_clockwise(points, ends)
-        ears = clipped_ears(points[order], ends.astype(np.int64))
-        return _without_copies(points, order[ears])
     a, b, c = (points[triangles[:, k]] for k in range(3))
     turned = _cross(b - a, c - a) < 0
     triangles[turned] = triangles[turned][:, ::-1]
+    whole = len(triangles) == len(points) + 2 * len(rings) - 4
+    if not (whole and _covers(points, ends, triangles) and _pair(triangles, len(points))):
+        order = _counter_clockwise(points, ends)
+        ears = clipped_ears(points[order], ends.astype(np.int64))
+        return _without_copies(points, order[ears])
     return triangles
+
+
+def _pair(triangles: Triangles, count: int) -> bool:
+    """Whether no directed edge stands twice, and all but those of the rings stand both ways."""
+    start, end = triangles.ravel(), triangles[:, [1, 2, 0]].ravel()
+    forth, back = start * count + end, end * count + start
+    alone = len(forth) - len(np.intersect1d(forth, back, assume_unique=True))
+    return len(np.unique(forth)) == len(forth) and alone == count
 
 
 def _counter_clockwise(points: Points2, ends: NDArray[np.uint32]) -> Integers:

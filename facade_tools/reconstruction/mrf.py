@@ -165,6 +165,8 @@ def _tree(facade: Facade, bands: list[Band], columns: list[Span], shape: tuple[i
     for band in bands:
         own = band.kind == "roof" and band.high > band.low
         stripes_ = roof_spans(facade, band, bands) if own else columns
+        if len(stripes_) > len(columns):
+            stripes_ = columns
         children.append(_storey(band, stripes_, width, at))
     if facade.sky > 0:
         children.append(Node("Sky", at.box(0, 0, width, facade.sky), label="sky"))

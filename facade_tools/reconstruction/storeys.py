@@ -32,10 +32,12 @@ HALF = 8  # cells: the least part of a roof
 SECOND = 2.0  # cost of a second row of windows in a roof
 
 PEAK = 0.45  # a peak of the autocorrelation counts from this share of the highest
+HALF_PEAK = 0.2  # and one at half its lag from this share: two storeys were taken for one
 SKY = 8.0  # CIELAB units between the sky and a building
 BUSY = 2.0  # how much windows above a line speak against its being the skyline
 UPPER = 0.4  # share of the building where roofs may be, and columns of their own
 OWN_ABOVE, OWN = 0.5, 0.2  # weights of what a row holds beside its agreement with the columns
+SKYWARD = 0.0
 MEAN = 12.0  # cells: standard deviation of the local mean that is taken off
 WEIGHTS = Weights(alpha=6.0, beta=0.1, boundary=0.3, content=1.0)
 EMPTY = 0.75  # cost of a floor without a row of windows
@@ -76,8 +78,12 @@ def period(rows: Floats) -> float:
     peaks = np.flatnonzero(inner) + 1
     if len(peaks) == 0 or values[peaks].max() <= 0:
         return n / 5
-    high = peaks[values[peaks] > PEAK * values[peaks].max()]
-    return float(lags[high[0]])
+    best = values[peaks].max()
+    first = peaks[values[peaks] > PEAK * best][0]
+    half = peaks[np.abs(lags[peaks] / lags[first] - 0.5) < 0.1]
+    if len(half) and values[half].max() > HALF_PEAK * best:
+        first = half[int(np.argmax(values[half]))]
+    return float(lags[first])
 
 
 def _correlation(one: Floats, two: Floats) -> float:
@@ -130,9 +136,11 @@ def row_profiles(facade: Facade) -> Rows:
     columns = np.maximum(columns / (np.percentile(columns, 90) + 1e-9), -0.3)
     any_ = strength(body, 4.0)
     any_ = any_ / (np.percentile(any_, 80) + 1e-9)
-    own = np.where(np.arange(len(body)) < UPPER * len(body), OWN_ABOVE, OWN)
+    above = np.arange(len(body)) < UPPER * len(body)
+    own = np.where(above, OWN_ABOVE, OWN)
     mixed = (1 - own) * columns + own * any_
-    mean = along_columns(mixed, MEAN)
+    sky = np.full(round(3 * MEAN), SKYWARD)  # what lies above the roof holds no window
+    mean = along_columns(np.concatenate([sky, mixed]), MEAN)[len(sky) :]
     return Rows(columns, mixed - mean)
 
 

@@ -29,7 +29,7 @@ WEIGHTS = Weights(alpha=3.0, beta=0.4, boundary=0.05, gap=0.03, content=0.2)
 COST = 0.25  # of a stripe
 CELL_SHARE = 0.4  # of the usual evidence: from here a cell holds a window
 ROOF_BLUR = 2.0  # cells: a dormer's frame and its pane are one
-ROW_SHARE = 0.5  # of the rows: from here a stripe is one
+ROW_SHARE = 0.4  # of the rows: from here a stripe is one
 
 Span = tuple[int, int]
 

@@ -13,14 +13,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from . import mixture
-from .em import Fit, Stop, run
+from .em import NOTHING, Fit, Stop, run
 from .lateral import Inputs, acyclic, admissible, crowded, parent_of
-from .network import Network
+from .network import Network, inputs_of
 from .score import cheeseman_stutz
 from .structure_search import Search, Tried
 
 TOGETHER = Stop(relative=1e-5, iterations=40)
 PROPOSALS = 3  # that may fail one after the other
+CLEAR = 3.0  # standard errors from which a correlation counts
 DOUBT = 10.0  # nats by which a proposal may look worse before EM has adapted to it
 
 
@@ -115,7 +116,7 @@ def ranked(search: Search, fit: Fit, options: list[dict[int, Inputs]]) -> list[t
     """
     gains = []
     for g, table in enumerate(options):
-        changes = list(changed(search, fit.network, g, table))
+        changes = list(changed(search, fit, g, table))
         if changes:
             task, family = search.task(g), fit.network.families[g]
             now, *after = (
@@ -128,19 +129,40 @@ def ranked(search: Search, fit: Fit, options: list[dict[int, Inputs]]) -> list[t
     return [(g, inputs) for gain, g, inputs in sorted(gains, reverse=True) if gain > -DOUBT]
 
 
-def changed(search: Search, network: Network, g: int, table: dict[int, Inputs]) -> Iterator[Inputs]:
-    """Yield the inputs of group g with one parent more or less."""
+def changed(search: Search, fit: Fit, g: int, table: dict[int, Inputs]) -> Iterator[Inputs]:
+    """Yield inputs of group g with a parent or a feature less, or a parent more.
+
+    A parent shows all that it can, or only the features that tell something.
+    """
     owners = parent_of(search.layout)
-    all_inputs = [family.inputs for family in network.families]
+    all_inputs = [family.inputs for family in fit.network.families]
     now = all_inputs[g]
-    for parent in sorted({owners[f] for f in now}):
-        yield tuple(f for f in now if owners[f] != parent)
+    smaller = {tuple(f for f in now if owners[f] != parent) for parent in {owners[f] for f in now}}
+    yield from sorted(smaller | {tuple(f for f in now if f != one) for one in now})
+    clear = telling(search, fit, g) if table else set()
     for parent, features in sorted(table.items()):
-        wider = tuple(sorted({*now, *features}))
-        after = (*all_inputs[:g], wider, *all_inputs[g + 1 :])
-        possible = parent >= 0 and wider != now and acyclic(after, search.layout)
-        if possible and not crowded(wider, search.data.groups[g]):
-            yield wider
+        shown = {tuple(sorted({*now, *some})) for some in (features, clear & set(features))}
+        for wider in sorted(shown - {now}) if parent >= 0 else ():
+            after = (*all_inputs[:g], wider, *all_inputs[g + 1 :])
+            if acyclic(after, search.layout) and not crowded(wider, search.data.groups[g]):
+                yield wider
+
+
+def telling(search: Search, fit: Fit, g: int) -> set[int]:
+    """Return the features that go with what group g's clusters leave over (|r| √n > `CLEAR`)."""
+    family, data, features = fit.network.families[g], search.data.groups[g], search.data.features
+    u = np.column_stack([np.ones(len(features)), inputs_of(family, features)])
+    mean = np.einsum("nk,kdq,nq->nd", fit.posterior.clusters[g], family.coef, u, optimize=True)
+    rest = np.where(data.dense, data.x - mean, 0.0)
+    out: set[int] = set()
+    for i in range(rest.shape[1]):
+        rows = data.dense[:, i] & (search.weights.groups[g] > 0)
+        if rows.sum() > 2:
+            shown = features[rows] - features[rows].mean(axis=0)
+            size = np.sqrt((shown**2).sum(axis=0) * (rest[rows, i] ** 2).sum()) + NOTHING
+            z = np.abs(rest[rows, i] @ shown) / size * np.sqrt(rows.sum())
+            out |= set(np.flatnonzero(z > CLEAR).tolist())
+    return out
 
 
 def proposed(search: Search, fit: Fit, g: int, inputs: Inputs) -> Network:

@@ -12,13 +12,14 @@ import numpy as np
 
 from .coordinates import Floats
 from .dataset import Dataset, Scaling, floors
-from .em import NOTHING, Prior, maximise, prior_precision, statistics
+from .em import NOTHING, Prior, maximise, statistics
 from .layout import GroupLayout
 from .network import Family, Pooled, empty_family, inputs_of, local_log_density, log_, log_sum
 from .score import log_marginal, pooled_cost
 
 CANDIDATES = 3  # clusters that are tried for a split
 TRIAL = 4  # iterations of each trial
+CLEAR = 3.0  # standard errors from which a pooled slope counts
 LEAST_ROWS = 2.0  # a cluster lighter than this is not split
 
 
@@ -98,7 +99,7 @@ def reshaped(task: Task, family: Family, inputs: tuple[int, ...]) -> Family:
 def regression(task: Task, inputs: tuple[int, ...]) -> Pooled | None:
     """Return the regression of every coordinate on the inputs, over the rows that observe it.
 
-    As careful as the prior: its precision stands for rows without any effect.
+    Slopes that are not clear (|t| below `CLEAR`) are 0.
     """
     if not inputs:
         return None
@@ -107,12 +108,20 @@ def regression(task: Task, inputs: tuple[int, ...]) -> Pooled | None:
     d, width = data.x.shape[1], u.shape[1]
     coef, spread = np.zeros((d, width)), np.ones(d)
     for i in range(d):
-        w = task.weight * data.dense[:, i]
-        a = (u * w[:, None]).T @ u + np.diag(prior_precision(width, task.prior))
-        coef[i] = np.linalg.solve(a, u.T @ (w * data.x[:, i]))
-        rest = data.x[:, i] - u @ coef[i]
-        spread[i] = (w @ rest**2 + 1.0) / (w.sum() + 1.0)
+        weight = task.weight * data.dense[:, i]
+        coef[i], spread[i], t = _least_squares(u, data.x[:, i], weight)
+        clear = np.flatnonzero((np.abs(t) >= CLEAR) | (np.arange(width) == 0))
+        coef[i] = 0.0
+        coef[i, clear], spread[i], _ = _least_squares(u[:, clear], data.x[:, i], weight)
     return Pooled(coef, spread)
+
+
+def _least_squares(u: Floats, x: Floats, weight: Floats) -> tuple[Floats, float, Floats]:
+    """Return coefficients, variance left over, t values; with one row of no effect (ridge)."""
+    a = (u * weight[:, None]).T @ u + np.eye(u.shape[1])
+    coef = np.asarray(np.linalg.solve(a, u.T @ (weight * x)))
+    left = float((weight @ (x - u @ coef) ** 2 + 1.0) / (weight.sum() + 1.0))
+    return coef, left, np.asarray(coef / np.sqrt(left * np.diag(np.linalg.inv(a))))
 
 
 def completed(task: Task, family: Family, clusters: Floats, inputs: tuple[int, ...]) -> float:
@@ -121,7 +130,9 @@ def completed(task: Task, family: Family, clusters: Floats, inputs: tuple[int, .
     weight = clusters * task.weight[:, None]
     data, features = task.data.groups[task.group], task.data.features
     stats = statistics(other, data, features, weight, weight.sum(axis=0)[None])
-    return float(log_marginal(stats, task.prior, other.pooled).sum()) - pooled_cost(stats)
+    return float(log_marginal(stats, task.prior, other.pooled).sum()) - pooled_cost(
+        stats, other.pooled
+    )
 
 
 def single(task: Task, inputs: tuple[int, ...] = (), *, tied: bool = False) -> Local:

@@ -35,14 +35,15 @@ def gaussian_part(stats: Statistics, family: Family, prior: Prior) -> float:
     if family.coef.shape[1] == 0:
         return 0.0
     marginal = log_marginal(stats, prior, family.pooled)
-    return float((marginal - log_complete(stats, family)).sum()) - pooled_cost(stats)
+    return float((marginal - log_complete(stats, family)).sum()) - pooled_cost(stats, family.pooled)
 
 
-def pooled_cost(stats: Statistics) -> float:
+def pooled_cost(stats: Statistics, pooled: Pooled | None) -> float:
     """Return what the pooled slopes cost, fitted to the same rows: log(rows)/2 each (BIC)."""
-    d, width = stats.xu.shape[1:]
+    if pooled is None:
+        return 0.0
     rows = float(stats.uu[:, 0, 0].sum())
-    return 0.5 * float(d * (width - 1)) * float(np.log(max(rows, 1.0)))
+    return 0.5 * float(np.count_nonzero(pooled.coef[:, 1:])) * float(np.log(max(rows, 1.0)))
 
 
 def log_marginal(stats: Statistics, prior: Prior, pooled: Pooled | None = None) -> Floats:

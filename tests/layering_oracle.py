@@ -13,13 +13,14 @@ import random
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linprog
+from scipy.optimize import linprog, nnls
 
 from facade_tools.layering.language import parse
 from facade_tools.layering.problem import Direction, LayerPattern, Rule
 
 TOLERANCES = (0.02, 0.05, 0.1, 0.2, 0.4)
-MOST_PARTITIONS = 20_000
+MOST_PARTITIONS = 200_000
+MOST_STEPS = 4_000_000
 
 
 class TooLarge(Exception):
@@ -116,10 +117,26 @@ def allowed(direction, words, column, before):
     return True
 
 
-def partitions(direction, words, split, mu):
-    """Yield all partitions (a list of columns) that the constraints and known sizes allow."""
+def least(direction, letters):
+    """A lower bound on the size of letters: unsized ones at their least."""
+    sizes = [direction.rules[a.symbol].size for a in letters]
+    return sum(0.01 * direction.canvas if size is None else size for size in sizes)
+
+
+def partitions(direction, words, split, mu, most):
+    """Yield all partitions (a list of columns) that the constraints and known sizes allow.
+
+    most: greatest Ω that known sizes may ask for.
+    """
     count = 0
     canvas, slack = direction.canvas, 1e-9 * direction.canvas
+    rest = [[least(direction, w[k:]) for k in range(len(w) + 2)] for w in words]
+    steps = {}
+
+    def options_of(row, state):
+        if (row, state) not in steps:
+            steps[row, state] = list(substrings(direction, words[row], state, split))
+        return steps[row, state]
 
     def sums(column):
         for word, cells in zip(words, column):
@@ -133,19 +150,24 @@ def partitions(direction, words, split, mu):
         if all(s == (len(w), False) for s, w in zip(states, words)):
             yield columns
             return
-        options = [list(substrings(direction, w, s, split)) for w, s in zip(words, states)]
+        options = [options_of(row, state) for row, state in enumerate(states)]
         for choice in itertools.product(*options):
             column = [cells for cells, _ in choice]
             count += 1
-            if count > MOST_PARTITIONS * 10:
+            if count > MOST_STEPS:
                 raise TooLarge
             if not any(column) or not allowed(
                 direction, words, column, columns[-1] if columns else None
             ):
                 continue
             values = list(sums(column))
+            if not values:
+                values = [0.0]
             more, wide = omega + max(values) - min(values), sigma + max(values)
-            if more <= mu + slack and wide <= canvas + mu + slack:
+            if more > most + slack:
+                continue
+            after = [rest[r][k + inside] for r, (_, (k, inside)) in enumerate(choice)]
+            if wide + max(after) <= canvas + mu + slack:
                 yield from walk([s for _, s in choice], [*columns, column], more, wide)
 
     yield from walk([(0, False)] * len(words), [], 0.0, 0.0)
@@ -286,28 +308,130 @@ def best(direction, words_of_layers):
             words for words in itertools.product(*words_of_layers) if admitted(direction, words, mu)
         ]
         for split in (False, True):
-            found = []
-            for words in candidates:
-                for number, columns in enumerate(partitions(direction, words, split, mu)):
-                    if number > MOST_PARTITIONS:
-                        raise TooLarge
-                    pieces = whole(columns)
-                    if any(times < 2 for times in pieces.values()):
-                        continue
-                    found.append((words, columns, sum(pieces.values())))
-            rows = []
-            for words, columns, pieces in found:
-                value = error(direction, words, columns, mu)
-                if value is not None:
-                    omega, sigma = value
-                    rows.append(
-                        (round(omega, 7), pieces, -len(columns), round(abs(sigma - direction.canvas), 7),
-                         len(rows), words, columns)
-                    )  # fmt: skip
-            for omega, pieces, columns, off, _, words, cols in sorted(rows, key=lambda r: r[:5]):
-                if sizable(direction, words, cols):
-                    return share, omega, pieces, -columns, off
+            for most in (0.0, mu / 16, mu / 4, mu):  # Ω from below: what is found first is least
+                found = best_within(direction, candidates, split, mu, most)
+                if found is not None:
+                    return (share, *found)
     return None
+
+
+def best_within(direction, candidates, split, mu, most):
+    """(Ω, pieces, columns, |Σ − canvas|) of the best sizable partition with Ω ≤ most, or None."""
+    rows = []
+    number = 0
+    for words in candidates:
+        loose = any(direction.rules[a.symbol].size is None for word in words for a in word)
+        for columns in partitions(direction, words, split, mu, most):
+            pieces = whole(columns)
+            if any(times < 2 for times in pieces.values()):
+                continue
+            number += 40 if pieces or loose else 1  # a linear programme takes a millisecond
+            if number > MOST_PARTITIONS:
+                raise TooLarge
+            value = error(direction, words, columns, mu)
+            if value is not None and value[0] <= most + 1e-9 * direction.canvas:
+                omega, sigma = value
+                off = round(abs(sigma - direction.canvas), 7)
+                key = (round(omega, 7), sum(pieces.values()), -len(columns), off, len(rows))
+                rows.append((*key, words, columns))
+    for omega, pieces, columns, off, _, words, cols in sorted(rows, key=lambda r: r[:5]):
+        if sizable(direction, words, cols):
+            return omega, pieces, -columns, off
+    return None
+
+
+def cells_of(alignment):
+    """The columns of a solver's alignment in this module's terms."""
+    columns = []
+    for j in range(alignment.count):
+        column = []
+        for row in range(len(alignment.candidate.words)):
+            first, end = alignment.letters(row, j)
+            start, stop = alignment.borders[j][row], alignment.borders[j + 1][row]
+            column.append(
+                [
+                    Cell(k, (k == first and start.inside) or (k == end - 1 and stop.inside))
+                    for k in range(first, end)
+                ]
+            )
+        columns.append(column)
+    return columns
+
+
+def broken(direction, alignment):
+    """What is wrong with a solver's alignment; nothing should be."""
+    words, columns = alignment.candidate.words, cells_of(alignment)
+    mu = alignment.tolerance * direction.canvas
+    if not admitted(direction, words, mu):
+        yield "eq. 7"
+    for row, word in enumerate(words):
+        letters = [c.letter for column in columns for c in column[row]]
+        if sorted(set(letters)) != list(range(len(word))) or letters != sorted(letters):
+            yield f"row {row} is not its word"
+    for before, column in zip([None, *columns], columns):
+        if not any(column) or not allowed(direction, words, column, before):
+            yield "a constraint of 5.2"
+    value = error(direction, words, columns, mu)
+    if value is None or abs(value[0] - alignment.omega) > 2e-6:
+        yield f"error {alignment.omega}, should be {value}"
+    if not sizable(direction, words, columns):
+        yield "no sizes"
+
+
+def reference_sizes(direction, alignments):
+    """Sizes of the sized symbols by bounded least squares, equalities as heavy rows.
+
+    x ≥ least is shifted to x ≥ 0 and solved by Lawson and Hanson's method: nothing in common with
+    the solver's.
+    """
+    canvas = direction.canvas
+    found = [(al.candidate.words, cells_of(al)) for al in alignments]
+    symbols = sorted({a.symbol for words, _ in found for w in words for a in w})
+    place = {s: i for i, s in enumerate(symbols)}
+    letters = {}
+    for g, (_, columns) in enumerate(found):
+        for j, column in enumerate(columns):
+            for row, cells in enumerate(column):
+                for c in cells:
+                    if c.piece:
+                        letters.setdefault((g, row, c.letter), []).append(len(place))
+                        place[g, row, c.letter, j] = len(place)
+    rows, right = [], []
+    for g, (words, columns) in enumerate(found):
+        total = np.zeros(len(place))
+        for j, column in enumerate(columns):
+            lines = []
+            for row, cells in enumerate(column):
+                line = np.zeros(len(place))
+                for c in cells:
+                    line[place[(g, row, c.letter, j) if c.piece else words[row][c.letter].symbol]] += 1
+                if cells:
+                    lines.append(line)
+            rows += [other - lines[0] for other in lines[1:]]
+            right += [0.0] * (len(lines) - 1)
+            total += lines[0]
+        rows.append(total)
+        right.append(1.0)
+    for (g, row, letter), places in letters.items():
+        line = np.zeros(len(place))
+        line[places] = 1
+        line[place[found[g][0][row][letter].symbol]] -= 1
+        rows.append(line)
+        right.append(0.0)
+    sizes = {s: direction.rules[s].size for s in symbols}
+    least = np.zeros(len(place))
+    for s, size in sizes.items():
+        least[place[s]] = 0.01 if size is None else 0.01 * size / canvas
+    wanted = [s for s in symbols if sizes[s] is not None]
+    goal = np.zeros((len(wanted), len(place)))
+    for i, s in enumerate(wanted):
+        goal[i, place[s]] = 1
+    wish = np.array([sizes[s] / canvas for s in wanted])
+    matrix, heavy = np.array(rows), 1e6
+    a = np.vstack([goal, heavy * matrix])
+    b = np.concatenate([wish - goal @ least, heavy * (np.array(right) - matrix @ least)])
+    x = nnls(a, b, maxiter=10_000)[0] + least
+    return {s: float(x[place[s]] * canvas) for s in wanted}
 
 
 def words_of(direction, row):
@@ -323,9 +447,10 @@ def random_direction(rng: random.Random, *, letters=5, layers=3, unsized=0.3, sp
     """A small random problem: sizes that nearly fit, all qualifiers, transparent and unsized."""
     canvas = 12.0
     rules = {}
+    pool = rng.choice([[1, 2, 3, 4, 5, 6], [1, 1.5, 2, 2.5, 3]]) if letters > 5 else range(1, 7)
     for name in "ABCDE":
         rules[name] = Rule(
-            size=float(rng.choice([1, 2, 3, 4, 5, 6])) + rng.choice([0, 0, 0, 0.1, -0.25]),
+            size=float(rng.choice(list(pool))) + rng.choice([0, 0, 0, 0.1, -0.25]),
             opaque=rng.random() < 0.85,
             attached=rng.random() < 0.12,
             unoccludable=rng.random() < 0.12,

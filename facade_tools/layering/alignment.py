@@ -14,16 +14,17 @@ import numpy as np
 
 from . import kernels, kernels_labels
 from .candidates import Bounds
-from .evaluation import Borders, Line, crossings, evaluate, least_error, substring_line
-from .problem import SLACK, Alignment, Candidate, Direction, Span
-from .rows import Integers, RowMaker, Rows
+from .evaluation import Borders, Line, crossings, evaluate, least_error
+from .lattice import Lattice, chain
+from .problem import SLACK, Alignment, Candidate, Direction, Rule, Span
+from .rows import Integers, RowMaker, Rows, TooLarge
 from .sizing import conflict
-from .words import Word
+from .words import Letter, Word
 
 Box = Mapping[str, tuple[float, float]]
 Key = tuple[float, int, int, float, tuple[Any, ...]]
 
-MANY_LAYERS = 4  # more than these: with Ω = 0 equal words are not aligned apart for more columns
+MANY_LAYERS = 5  # more than these are searched with equal words as one row
 FIRST_LABELS = 4_000
 FIRST_STEPS = 300_000
 GROWTH = 8
@@ -110,25 +111,27 @@ def full_key(alignment: Alignment, canvas: float) -> Key:
 @cache
 def prepare() -> None:
     """Load or compile the search before a clock starts: the first time ever takes seconds."""
-    letter = np.array([[0, 1, 0, 0, 1]], np.int64)
-    one = np.array([1], np.int64)
-    limits = np.array([0, 1, 1, 0, 100, 0, 0, 0], np.int64)
-    kernels.search(
-        np.array([0, 1], np.int64), one, one, letter, np.ones((1, 1), np.int64),
-        np.array([1], np.uint64), np.zeros(0, np.uint64), limits, np.array([8, 8], np.int64),
-    )  # fmt: skip
+    rules = {"A": Rule(1.0), "t": Rule(1.0, transparent=True)}
+    direction = Direction("x", 2.0, rules, {})
+    word = (Letter("A"), Letter("t", transparent=True))
+    candidate = Candidate((word,), parts=(1,), lattices=(chain(word),))
+    task = Task(candidate, (), 0.4, 1.0, splits=True)
+    Aligner(direction).best(task)
 
 
 class Aligner:
     """Aligns candidates of one direction."""
 
     def __init__(
-        self, direction: Direction, late: Callable[[float], bool] = lambda _: False
+        self,
+        direction: Direction,
+        late: Callable[[float], bool] = lambda _: False,
+        now: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Align; `late(s)` tells whether the time will be up in s seconds."""
-        self.direction, self.late = direction, late
+        """Align; `late(s)` tells whether the time will be up in s seconds by the clock `now`."""
+        self.direction, self.late, self.now = direction, late, now
         self.maker = RowMaker(direction)
-        self._known: dict[tuple[tuple[Word, ...], str], list[float]] = {}
+        self._known: dict[tuple[tuple[Lattice, ...], str], list[float]] = {}
 
     def best(self, task: Task) -> Found:
         """Return the best alignment of a candidate within its budget of Ω."""
@@ -195,14 +198,21 @@ class Aligner:
         """Return the path of least lower bound, and whether the search was complete."""
         complete = True
         lines: list[Borders] = []
+        words: list[Word] = []
         for part, (first, end) in enumerate(task.candidate.split()):
-            borders, whole = self._group(task.candidate.words[first:end], task, node, part, ease)
+            lattices = task.candidate.lattices[first:end]
+            try:
+                found, whole = self._group(lattices, task, node, part, ease)
+            except TooLarge:
+                found, whole = None, False
             complete = complete and whole
-            if borders is None:
+            if found is None:
                 return None, complete
-            lines.append(borders)
+            lines.append(found.borders)
+            words += found.words
         joined = _joined(lines)
-        path = evaluate(self.direction, task.candidate, joined, task.tolerance, node.box)
+        candidate = replace(task.candidate, words=tuple(words))
+        path = evaluate(self.direction, candidate, joined, task.tolerance, node.box)
         if len(lines) == 1 and node.box:
             floor = self.direction.canvas * (1.0 - task.tolerance - SLACK)
             path = replace(path, omega=path.omega + max(0.0, floor - path.sigma))
@@ -210,19 +220,35 @@ class Aligner:
         return (path if hopeful else None), complete
 
     def _group(
-        self, words: tuple[Word, ...], task: Task, node: _Node, part: int, ease: float
-    ) -> tuple[Borders | None, bool]:
-        merged = self.maker.rows(words, node.box, True)
-        twins = len(merged.words) < len(words)
+        self, lattices: tuple[Lattice, ...], task: Task, node: _Node, part: int, ease: float
+    ) -> tuple[_Path | None, bool]:
         strict = self._limits(task, False, ease, bool(node.box))
-        if not twins or (len(words) > MANY_LAYERS and task.budget == 0.0):
+        merged = self.maker.rows(lattices, node.box, True, task.splits)
+        twins = len(merged.lattices) < len(lattices)
+        if not twins:
             return self._run(merged, task, strict, node.forbidden[part])
-        loose = self._limits(task, not task.splits, ease, bool(node.box))
-        borders, complete = self._run(merged, task, loose, node.forbidden[part])
-        if borders is None or self._covered(words, borders):
-            return borders, complete
-        rows = self.maker.rows(words, node.box, False)
-        return self._run(rows, task, strict, node.forbidden[part])
+        if self._fills(merged, limits=strict) and not task.splits:
+            loose = self._limits(task, True, ease, bool(node.box))
+            path, complete = self._run(merged, task, loose, node.forbidden[part])
+            if path is None or self._covered(path.words, path.borders):
+                return path, complete
+        if len(lattices) <= MANY_LAYERS:
+            rows = self.maker.rows(lattices, node.box, False, task.splits)
+            return self._run(rows, task, strict, node.forbidden[part])
+        path, _ = self._run(merged, task, strict, node.forbidden[part])
+        return path, False
+
+    @staticmethod
+    def _fills(rows: Rows, limits: Integers) -> bool:
+        """Tell whether rows that stand for several layers have no room for an empty column.
+
+        Then those layers share their borders: the least opaque letter is wider than what the
+        canvas and the tolerance leave beside such a word.
+        """
+        start = rows.starts[:-1]
+        room = limits[kernels_labels.WIDEST] - rows.places[start, kernels_labels.REST]
+        several = rows.info[:, kernels_labels.WEIGHT] > 1
+        return bool(np.all(room[several] < rows.narrowest))
 
     def _covered(self, words: tuple[Word, ...], borders: Borders) -> bool:
         """Tell whether every column has a substring that is opaque throughout."""
@@ -246,34 +272,39 @@ class Aligner:
             if free and len(task.candidate.parts) < 2
             else 0.0
         )
+        whole = any(len(one.words) > 1 for one in task.candidate.lattices)
+        shortest = canvas * (1.0 - task.tolerance) - slack if whole else -canvas
         return np.array(
             [
                 scale.down(budget), scale.down(widest), scale.of(canvas), task.splits,
                 effort.steps, effort.beam, loose, max(0, scale.down(floor)),
+                scale.down(shortest),
             ],
             np.int64,
         )  # fmt: skip
 
     def _run(
         self, rows: Rows, task: Task, limits: Integers, forbidden: tuple[int, ...]
-    ) -> tuple[Borders | None, bool]:
+    ) -> tuple[_Path | None, bool]:
         labels, steps = FIRST_LABELS, FIRST_STEPS
         while True:
             capacity = np.array([labels, labels], np.int64)
             limits[kernels_labels.MAX_STEPS] = steps
-            started = time.monotonic()
+            started = self.now()
             status, codes = kernels.search(
-                rows.starts, rows.low, rows.high, rows.flags, rows.tally, rows.keys,
-                np.array(forbidden, np.uint64), limits, capacity,
+                rows.starts, rows.places, rows.tally, rows.keys, rows.steps, rows.first,
+                rows.info, rows.stack, rows.spelling, np.array(forbidden, np.uint64), limits,
+                capacity,
             )  # fmt: skip
             full = max(status[kernels_labels.LABELS], status[kernels_labels.STATES]) >= labels
             long = status[kernels_labels.STEPS] > steps
             most = (full and labels >= task.effort.labels) or (long and steps >= task.effort.steps)
-            if not (full or long) or most or self.late(GROWTH * (time.monotonic() - started)):
+            if not (full or long) or most or self.late(GROWTH * (self.now() - started)):
                 break
             labels, steps = labels * (GROWTH if full else 1), steps * (GROWTH if long else 1)
-        borders = _decoded(rows, codes) if len(codes) else None
-        return borders, bool(status[kernels_labels.COMPLETE])
+        return (_decoded(rows, codes) if len(codes) else None), bool(
+            status[kernels_labels.COMPLETE]
+        )
 
     def _examine(
         self, path: Alignment, node: _Node, task: Task
@@ -328,17 +359,11 @@ class Aligner:
 
     def _breakpoints(self, candidate: Candidate, name: str) -> list[float]:
         """Return all sizes at which some substrings of two of the words are equal."""
-        key = candidate.words, name
+        key = candidate.lattices, name
         if key not in self._known:
-            own, others = set[Line](), set[Line]()
-            for word in set(candidate.words):
-                for first in range(len(word)):
-                    for end in range(first + 1, len(word) + 1):
-                        if word[end - 1].transparent != word[first].transparent:
-                            break
-                        line = substring_line(self.direction, word[first:end], name)
-                        (own if line[0] else others).add(line)
-            meets = {(b - a) / k for k, a in own for _, b in others} | crossings(own)
+            lines = set[Line]().union(*(self.maker.lines(one, name) for one in set(key[0])))
+            own = {line for line in lines if line[0]}
+            meets = {(b - a) / k for k, a in own for n, b in lines if not n} | crossings(own)
             self._known = {key: sorted(meets)}
         return self._known[key]
 
@@ -358,25 +383,50 @@ class Aligner:
 
     def column_hashes(self, path: Alignment, column: int) -> tuple[int, ...]:
         """Return the hashes by which the search recognises a column, rows merged and not."""
-        words = path.candidate.words
-        box = {name: (0.0, 0.0) for name, *_ in path.candidate.unsized}
-        both = [self.maker.rows(words, box, merge) for merge in (True, False)]
-        return tuple(dict.fromkeys(self._hash(rows, path, column) for rows in both))
+        both = [self.maker.grouped(path.candidate.lattices, merge) for merge in (True, False)]
+        return tuple(dict.fromkeys(self._hash(groups, path, column) for groups in both))
 
-    @staticmethod
-    def _hash(rows: Rows, path: Alignment, column: int) -> int:
+    def _hash(self, groups: list[list[int]], path: Alignment, column: int) -> int:
         start, end = path.borders[column], path.borders[column + 1]
-        layers = [layers[0] for layers in rows.layers]
-        code = np.array([4 * start[i].letters + 2 * start[i].inside for i in layers], np.int64)
-        ends = np.array([end[i].letters for i in layers], np.int64)
-        opens = np.array([int(end[i].inside) for i in layers], np.int64)
-        return int(kernels.column_hash(len(layers), rows.starts, code, ends, opens, rows.keys))
+        total = 0
+        for row, (layer, *_) in enumerate(groups):
+            a, b, word = start[layer], end[layer], path.candidate.words[layer]
+            if a != b or a.inside:
+                keys = (self.maker.place_key(word, x.letters, x.inside) for x in (a, b))
+                before, after = map(np.uint64, keys)
+                total += int(kernels.row_hash(row, before, after, int(a.inside) + int(b.inside)))
+        return total & (2**64 - 1)
 
 
-def _decoded(rows: Rows, codes: Any) -> Borders:
+@dataclass(frozen=True, slots=True)
+class _Path:
+    """What a search has found for one group: the word of every layer, and the borders."""
+
+    words: tuple[Word, ...]
+    borders: Borders
+
+
+def _decoded(rows: Rows, codes: Any) -> _Path:
     owner = {layer: row for row, layers in enumerate(rows.layers) for layer in layers}
-    spans = [[Span(int(c) >> 2, bool((int(c) >> 1) & 1)) for c in line] for line in codes]
-    return tuple(tuple(line[owner[layer]] for layer in sorted(owner)) for line in spans)
+    depths = rows.places[codes >> 2, kernels_labels.DEPTH].tolist()
+    spans = [[Span(depth >> 1, bool(depth & 1)) for depth in line] for line in depths]
+    words = [_word_of(rows, codes, row) for row in range(len(rows.lattices))]
+    layers = sorted(owner)
+    return _Path(
+        tuple(words[owner[layer]] for layer in layers),
+        tuple(tuple(line[owner[layer]] for layer in layers) for line in spans),
+    )
+
+
+def _word_of(rows: Rows, codes: Any, row: int) -> Word:
+    lattice = rows.lattices[row]
+    if lattice.single:
+        return lattice.word
+    offset = sum(len(other.edges) for other in rows.lattices[:row])
+    edges = kernels_labels.spelt(
+        np.arange(len(codes)), row, codes, rows.places, rows.first, rows.steps, rows.spelling
+    )
+    return tuple(lattice.edges[edge - offset].letter for edge in edges)
 
 
 def _joined(parts: list[Borders]) -> Borders:

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import prod
 
 import daqp
 import numpy as np
 
 from .language import counters_of
+from .lattice import FEW_WORDS, Family, Lattice, lattices, most_words
 from .problem import LEAST_UNSIZED, SLACK, Candidate, Direction, LayerPattern
-from .words import Expansion, Word, WordList, expand, least_size
+from .words import Expansion, Word, expand, least_size
+
+FEW_CLASSES = 64  # so many tuples of multisets of letters are searched one by one
+FALL_BACK = 64  # words of a pattern whose lattices are too large
 
 Ranges = Mapping[str, tuple[int, int]]
 
@@ -40,9 +45,13 @@ class Generator:
         groups: Sequence[str],
         tolerance: float,
         late: Callable[[], bool] = lambda: False,
+        few: float = FEW_WORDS,
     ) -> None:
-        """Prepare; `late` tells when to stop, which leaves the rest out."""
-        self.late = late
+        """Prepare; `late` tells when to stop, which leaves the rest out.
+
+        few: patterns with more words under the same counters give lattices of them.
+        """
+        self.late, self.few = late, few
         self.direction = direction
         self.rows = [row for group in groups for row in direction.groups[group]]
         self.parts = tuple(len(direction.groups[group]) for group in groups)
@@ -53,18 +62,58 @@ class Generator:
         self.limit = self.canvas + self.tolerance + self.slack
         self.least = direction.least_sizes()
         self.complete = True
-        self._words: dict[tuple[int, tuple[int, ...]], WordList] = {}
+        self._rows: dict[tuple[int, tuple[int, ...]], Family] = {}
 
     def candidates(self) -> Iterator[Candidate]:
         """Yield candidates, each tuple of words once, small counters first."""
-        seen: set[tuple[Word, ...]] = set()
+        seen: set[tuple[object, ...]] = set()
         for counters in self.assignments():
-            for words in self.tuples(counters):
-                if words not in seen:
-                    seen.add(words)
-                    box = self.box(words)
-                    if box is not None:
-                        yield Candidate(words, tuple(sorted(counters.items())), box, self.parts)
+            for rows in self.tuples(counters):
+                key = tuple(row.word if row.single else id(row) for row in rows)
+                if key not in seen:
+                    seen.add(key)
+                    candidate = self._candidate(rows, counters)
+                    if candidate is not None:
+                        yield candidate
+
+    def sampled(self, rng: np.random.Generator) -> Iterator[Candidate]:
+        """Yield candidates with random counters and words; the same one may come again."""
+        names = sorted(set[str]().union(*(counters_of(row.node) for row in self.rows)))
+        while not self.late():
+            ranges = {name: self.direction.counters[name] for name in names}
+            for name in rng.permutation(names):
+                ranges[name] = self._drawn(str(name), ranges, rng)
+            counters = {name: low for name, (low, _) in ranges.items()}
+            lists = self._lists(counters)
+            if all(lists):
+                drawn = [[each[int(rng.integers(len(each)))]] for each in lists]
+                for rows in self._tuples(drawn, (), 0.0):
+                    candidate = self._candidate(rows, counters)
+                    if candidate is not None:
+                        yield candidate
+
+    def _candidate(
+        self, rows: tuple[Lattice, ...], counters: Mapping[str, int]
+    ) -> Candidate | None:
+        """Return the candidate of some rows, unless eq. 7 rules it out."""
+        words = tuple(row.word for row in rows)
+        whole = any(len(row.words) > 1 for row in rows)
+        box = () if whole else self.box(words)
+        if box is None:
+            return None
+        return Candidate(words, tuple(sorted(counters.items())), box, self.parts, rows)
+
+    def _drawn(self, name: str, ranges: Ranges, rng: np.random.Generator) -> tuple[int, int]:
+        """Return a random value of a counter, from those that leave no layer too wide."""
+        low, high = ranges[name]
+        while low < high:
+            middle = (low + high) // 2
+            if self._possible({**ranges, name: (middle + 1, high)}):
+                value = int(rng.integers(low, high + 1))
+                if self._possible({**ranges, name: (value, value)}):
+                    return value, value
+            high = middle
+        return low, low
 
     def assignments(self) -> Iterator[dict[str, int]]:
         """Yield values of the group's counters under which every layer may have a fitting word."""
@@ -98,30 +147,60 @@ class Generator:
         how = Expansion({}, self.least, self.limit)
         return all(least_size(row.node, how, ranges) <= self.limit for row in self.rows)
 
-    def words(self, layer: int, counters: Mapping[str, int]) -> list[Word]:
-        """Return the words of a layer that are not too wide."""
+    def rows_of(self, layer: int, counters: Mapping[str, int]) -> Family:
+        """Return the words of a layer that are not too wide, or lattices of them."""
         row = self.rows[layer]
         used = tuple(counters[name] for name in sorted(counters_of(row.node)))
         key = (layer, used)
-        if key not in self._words:
-            self._words[key] = self._expanded(row, counters)
-        self.complete = self.complete and self._words[key].complete
-        return self._words[key].words
+        if key not in self._rows:
+            self._rows[key] = self._expanded(row, counters)
+        found = self._rows[key]
+        self.complete = self.complete and found.complete
+        return found
 
-    def _expanded(self, row: LayerPattern, counters: Mapping[str, int]) -> WordList:
-        transparent = frozenset(n for n, rule in self.direction.rules.items() if rule.transparent)
-        how = Expansion(counters, self.least, self.limit, row.reflection, transparent)
-        return expand(row.node, how)
+    def _expanded(self, row: LayerPattern, counters: Mapping[str, int]) -> Family:
+        rules = self.direction.rules
+        transparent = frozenset(n for n, rule in rules.items() if rule.transparent)
+        how = Expansion(
+            counters, self.least, self.limit, row.reflection, transparent, late=self.late
+        )
+        if most_words(row.node, counters) > self.few:
+            attached = frozenset(n for n, rule in rules.items() if rule.attached)
+            found = lattices(row.node, how, attached)
+            if found is not None:
+                return found
+            how = replace(how, most=FALL_BACK)
+        words = expand(row.node, how)
+        return Family.of_words(words.words, words.complete)
 
-    def tuples(self, counters: Mapping[str, int]) -> Iterator[tuple[Word, ...]]:
+    def tuples(self, counters: Mapping[str, int]) -> Iterator[tuple[Lattice, ...]]:
         """Yield the tuples of words of which each is long enough for its layer."""
-        lists = [self.words(layer, counters) for layer in range(len(self.rows))]
+        lists = self._lists(counters)
         if all(lists):
             yield from self._tuples(lists, (), 0.0)
 
+    def _lists(self, counters: Mapping[str, int]) -> list[list[Lattice]]:
+        families = [self.rows_of(layer, counters) for layer in range(len(self.rows))]
+        if self._together(families):
+            return [[one.whole] if one.mixed else one.classes for one in families]
+        return [one.classes for one in families]
+
+    def _together(self, families: Sequence[Family]) -> bool:
+        """Tell whether one search for all multisets of letters pays, and is possible.
+
+        Ranges of unsized sizes belong to a multiset; words in groups that stand in one candidate
+        are kept apart, too.
+        """
+        count = prod(len(family.words) for family in families if family.mixed)
+        if count < FEW_CLASSES or len(self.parts) > 1:
+            return False
+        rules = self.direction.rules
+        letters = {a.symbol for family in families for word in family.words for a in word}
+        return all(rules[name].size is not None for name in letters)
+
     def _tuples(
-        self, lists: list[list[Word]], head: tuple[Word, ...], opaque: float
-    ) -> Iterator[tuple[Word, ...]]:
+        self, lists: list[list[Lattice]], head: tuple[Lattice, ...], opaque: float
+    ) -> Iterator[tuple[Lattice, ...]]:
         if len(head) == len(lists):
             yield head
             return
@@ -129,12 +208,12 @@ class Generator:
             return
         opaque = 0.0 if len(head) in self.tops else opaque
         least = self.canvas - self.tolerance - opaque - self.slack
-        for word in lists[len(head)]:
-            if any(self.direction.rules[a.symbol].size is None for a in word) or (
-                self.known(word) >= least
+        for row in lists[len(head)]:
+            if any(self.direction.rules[a.symbol].size is None for a in row.word) or (
+                max(map(self.known, row.words)) >= least
             ):
-                above = opaque + self.direction.opaque_size(word)
-                yield from self._tuples(lists, (*head, word), above)
+                above = opaque + max(map(self.direction.opaque_size, row.words))
+                yield from self._tuples(lists, (*head, row), above)
 
     def known(self, word: Word) -> float:
         """Return the summed size (m) of a word's sized letters."""

@@ -10,18 +10,24 @@ from .candidates import Generator
 from .language import symbols_of
 from .problem import TOLERANCES, Direction, LayerPattern
 from .search import Clock, GroupSearch
+from .words import MAX_LETTERS, MAX_WORDS
 
 QUALIFIERS = ("unoccludable", "attached", "opaque")
 NEAREST = 3
 
 
 def explanation(
-    direction: Direction, groups: Sequence[str], seconds: float, *, late: bool = False
+    direction: Direction, groups: Sequence[str], seconds: float, *, late: bool, proved: bool
 ) -> str:
     """Return in the words of the design what rules a layout out, within some seconds."""
     where = f"{direction.axis} ({direction.canvas:g} m)"
     if late:
         return f"{where}: no layout found in the time given; not proved that there is none"
+    if not proved:
+        return (
+            f"{where}: no layout found; not proved that there is none: a pattern has more than "
+            f"{MAX_WORDS} words that may fit, or words of more than {MAX_LETTERS} letters"
+        )
     group = next((g for g in groups if _hopeless(direction, g, _deadline(seconds / 4))), None)
     if group is None:
         names = " and ".join(groups)
@@ -36,8 +42,8 @@ def _deadline(seconds: float) -> float:
 
 def _hopeless(direction: Direction, group: str, until: float) -> bool:
     clock = Clock(until)
-    answer = GroupSearch(direction, (group,), clock).answer()
-    return answer is None and not clock.late
+    search = GroupSearch(direction, (group,), clock)
+    return search.answer() is None and search.exhausted
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,15 @@ from ..compiled import compiled
 # Columns of the label table.
 OMEGA, SIGMA, PIECES, COLUMNS, PARENT, STATE, NEXT, ALIVE = range(8)
 # Entries of `limits`.
-BUDGET, WIDEST, CANVAS, SPLITS, MAX_STEPS, BEAM, LOOSE, FLOOR = range(8)
+BUDGET, WIDEST, CANVAS, SPLITS, MAX_STEPS, BEAM, LOOSE, FLOOR, SHORTEST = range(9)
+# Columns of `places`: REST from there on, DEPTH 2 · letters + OPEN, AFTER an attached letter, ASKS:
+# before one, OPEN: inside a letter of size LEAST to MOST whose rank is that of the edge SPELT.
+# BEFORE: size of the letters before, COVER: of the opaque ones.
+REST, DEPTH, AFTER, ASKS, OPEN, LEAST, MOST, FINAL, SPELT, BEFORE, COVER = range(11)
+# Columns of `steps`: LOW and HIGH of their whole letters, which the segment SPELLING spells.
+TO_PLACE, LOW, HIGH, IS_CLEAR, IS_SOLID, IS_BARE, HAS_GRIPS, SPELLING = range(8)
+# Columns of `rows`.
+SOLID, WEIGHT, NEEDS_GAP = range(3)
 # Entries of `status`.
 BEST, COMPLETE, STEPS, LABELS, STATES = range(5)
 
@@ -80,9 +88,9 @@ def beam_bar(state: int, chain: Array, head: Array, labels: Array, beam: int, st
 
 @compiled
 def add_label(
-    target: int, parent: int, omega: int, sigma: int, pieces: int, m: int, starts: Array,
-    limits: Array, prefix_low: Array, labels: Array, reach: Array, codes: Array, head: Array,
-    status: Array, grip: Array,
+    target: int, parent: int, omega: int, sigma: int, pieces: int, m: int, places: Array,
+    first: Array, steps: Array, spelling: Any, limits: Array, labels: Array,
+    reach: Array, codes: Array, head: Array, status: Array, grip: Array,
 ) -> None:  # fmt: skip
     """Add a label to a state unless another is better; drop those that it betters."""
     columns = labels[parent, COLUMNS] + 1
@@ -93,26 +101,36 @@ def add_label(
     labels[fresh, OMEGA], labels[fresh, SIGMA] = omega, sigma
     labels[fresh, PIECES], labels[fresh, COLUMNS] = pieces, columns
     labels[fresh, PARENT], labels[fresh, STATE] = parent, target
-    if limits[SPLITS]:
-        for r in range(m):
-            held = (codes[target, r] >> 1) & 1
-            reach[fresh, r, 0] = grip[r, 0] if held else 0
-            reach[fresh, r, 1] = grip[r, 1] if held else 0
     rest = np.int64(0)
     for r in range(m):
-        at = starts[r] + (codes[target, r] >> 2) + ((codes[target, r] >> 1) & 1) + r
-        rest = max(rest, prefix_low[starts[r + 1] + r] - prefix_low[at])
+        there = codes[target, r] >> 2
+        held = places[there, OPEN]
+        if limits[SPLITS]:
+            reach[fresh, r, 0] = grip[r, 0] if held else 0
+            reach[fresh, r, 1] = grip[r, 1] if held else 0
+        rest = max(rest, places[there, REST] - places[there, LEAST])
     full = sigma + rest >= limits[CANVAS]
-    other = head[target]
+    other, before = head[target], np.int64(-1)
     while other >= 0:
-        if not labels[other, ALIVE]:
-            other = labels[other, NEXT]
-            continue
-        if better(other, fresh, m, labels, reach, codes, full, limits):
-            return
-        if better(fresh, other, m, labels, reach, codes, full, limits):
-            labels[other, ALIVE] = 0
-        other = labels[other, NEXT]
+        after = labels[other, NEXT]
+        if labels[other, ALIVE]:
+            if better(
+                other, fresh, m, labels, reach, codes, full, limits, places, first, steps,
+                spelling,
+            ):  # fmt: skip
+                return
+            if better(
+                fresh, other, m, labels, reach, codes, full, limits, places, first, steps,
+                spelling,
+            ):  # fmt: skip
+                labels[other, ALIVE] = 0
+                if before < 0:
+                    head[target] = after
+                else:
+                    labels[before, NEXT] = after
+                other = after
+                continue
+        before, other = other, after
     labels[fresh, NEXT], labels[fresh, ALIVE] = head[target], 1
     head[target] = fresh
     status[LABELS] += 1
@@ -120,8 +138,8 @@ def add_label(
 
 @compiled
 def better(
-    a: int, b: int, m: int, labels: Array, reach: Array, codes: Array, full: bool,
-    limits: Array,
+    a: int, b: int, m: int, labels: Array, reach: Array, codes: Array, full: bool, limits: Array,
+    places: Array, first: Array, steps: Array, spelling: Any,
 ) -> bool:  # fmt: skip
     """Tell whether whatever completes label b completes label a at least as well."""
     if labels[a, OMEGA] > labels[b, OMEGA] or labels[a, SIGMA] > labels[b, SIGMA]:
@@ -142,51 +160,126 @@ def better(
         return bool(labels[a, COLUMNS] > labels[b, COLUMNS])
     if labels[a, SIGMA] < labels[b, SIGMA]:
         return full
-    return not lexically_less(b, a, m, labels, codes)
+    return not named_before(b, a, m, labels, codes, places, first, steps, spelling)
 
 
 @compiled
-def lexically_less(a: int, b: int, m: int, labels: Array, codes: Array) -> bool:
-    """Compare the columns of two labels with equally many: by row, then by column."""
+def named_before(
+    a: int, b: int, m: int, labels: Array, codes: Array, places: Array, first: Array,
+    steps: Array, spelling: Any,
+) -> bool:  # fmt: skip
+    """Compare two labels with equally many columns: words by row, then columns by row."""
     count = labels[a, COLUMNS]
-    borders = np.empty((2, count), np.int64)
+    borders = np.empty((2, count + 1), np.int64)
     for side in range(2):
         label = a if side == 0 else b
-        for k in range(count):
-            borders[side, count - 1 - k] = labels[label, STATE]
+        for k in range(count + 1):
+            borders[side, count - k] = labels[label, STATE]
             label = labels[label, PARENT]
     for r in range(m):
-        for k in range(count):
-            x, y = codes[borders[0, k], r] >> 1, codes[borders[1, k], r] >> 1
+        if spelling[3][r]:
+            mine = spelt(borders[0], r, codes, places, first, steps, spelling)
+            theirs = spelt(borders[1], r, codes, places, first, steps, spelling)
+            for k in range(min(len(mine), len(theirs))):
+                x, y = spelling[0][mine[k]], spelling[0][theirs[k]]
+                if x != y:
+                    return bool(x < y)
+            if len(mine) != len(theirs):
+                return len(mine) < len(theirs)
+    for r in range(m):
+        for k in range(count + 1):
+            x = places[codes[borders[0, k], r] >> 2, DEPTH]
+            y = places[codes[borders[1, k], r] >> 2, DEPTH]
             if x != y:
                 return bool(x < y)
     return False
 
 
 @compiled
+def spelt(
+    border: Array, r: int, codes: Array, places: Array, first: Array, steps: Array, spelling: Any
+) -> Array:
+    """Return the edges that a row's path of places spells, the first word of those possible."""
+    heads, tails = spelling[1], spelling[2]
+    last = codes[border[len(border) - 1], r] >> 2
+    out = np.empty(places[last, DEPTH] >> 1, np.int64)
+    length = 0
+    for k in range(len(border) - 1):
+        code, end = codes[border[k], r], codes[border[k + 1], r] >> 2
+        here = code >> 2
+        if here == end:
+            continue
+        if places[here, OPEN]:
+            out[length] = places[here, SPELT]
+            length += 1
+        best = np.int64(-1)
+        for step in range(first[here], first[here + 1]):
+            if steps[step, TO_PLACE] == end and not (code & 1 and steps[step, HAS_GRIPS]):
+                segment = steps[step, SPELLING]
+                if best < 0 or segment_before(segment, best, spelling):
+                    best = segment
+        while best >= 0:
+            out[length] = heads[best]
+            length += 1
+            best = tails[best]
+    return out[:length]
+
+
+@compiled
+def segment_before(a: int, b: int, spelling: Any) -> bool:
+    """Tell whether a segment's word comes before another's of the same length."""
+    ranks, heads, tails = spelling[0], spelling[1], spelling[2]
+    while a >= 0 and b >= 0:
+        x, y = ranks[heads[a]], ranks[heads[b]]
+        if x != y:
+            return bool(x < y)
+        a, b = tails[a], tails[b]
+    return False
+
+
+@compiled
 def best_label(
-    state: int, chain: Array, head: Array, labels: Array, codes: Array, starts: Array,
-    limits: Array, status: Array,
+    count: int, head: Array, labels: Array, codes: Array, places: Array, first: Array,
+    steps: Array, spelling: Any, limits: Array, rows: Array, stack: Array,
 ) -> Any:  # fmt: skip
-    """Return the best complete label, or -1."""
-    best = -1
-    m = len(starts) - 1
-    while state >= 0:
-        finished = True
-        for r in range(m):
-            finished = finished and codes[state, r] >> 1 == 2 * (starts[r + 1] - starts[r])
-        label = head[state] if finished else -1
+    """Return the best complete label among those of the first `count` states, or -1."""
+    best = np.int64(-1)
+    m = codes.shape[1]
+    for state in range(count):
+        if not finished(codes[state], places, limits, rows, stack):
+            continue
+        label = head[state]
         while label >= 0:
             within = lifted(label, labels, limits) <= limits[BUDGET]
             if (
                 labels[label, ALIVE]
                 and within
-                and (best < 0 or wins(label, best, m, labels, codes, limits))
-            ):
+                and (
+                    best < 0
+                    or wins(
+                        label, best, m, labels, codes, limits, places, first, steps, spelling,
+                    )
+                )
+            ):  # fmt: skip
                 best = label
             label = labels[label, NEXT]
-        state = chain[state]
     return best
+
+
+@compiled
+def finished(code: Array, places: Array, limits: Array, rows: Array, stack: Array) -> bool:
+    """Tell whether every row is at an end, and its word long enough (IMAW15 eq. 7)."""
+    for r in range(len(code)):
+        been = (code[r] >> 1) & 1
+        if not places[code[r] >> 2, FINAL] or been < rows[r, NEEDS_GAP]:
+            return False
+    above = np.int64(0)
+    for layer in range(len(stack)):
+        there = code[stack[layer]] >> 2
+        if places[there, BEFORE] + above < limits[SHORTEST]:
+            return False
+        above += places[there, COVER]
+    return True
 
 
 @compiled
@@ -200,7 +293,10 @@ def lifted(a: int, labels: Array, limits: Array) -> Any:
 
 
 @compiled
-def wins(a: int, b: int, m: int, labels: Array, codes: Array, limits: Array) -> bool:
+def wins(
+    a: int, b: int, m: int, labels: Array, codes: Array, limits: Array, places: Array,
+    first: Array, steps: Array, spelling: Any,
+) -> bool:  # fmt: skip
     """Tell whether a complete label goes before another: Ω, pieces, columns, Σ, names."""
     canvas = limits[CANVAS]
     x, y = lifted(a, labels, limits), lifted(b, labels, limits)
@@ -213,7 +309,7 @@ def wins(a: int, b: int, m: int, labels: Array, codes: Array, limits: Array) -> 
     x, y = abs(labels[a, SIGMA] - canvas), abs(labels[b, SIGMA] - canvas)
     if x != y:
         return bool(x < y)
-    return lexically_less(a, b, m, labels, codes)
+    return named_before(a, b, m, labels, codes, places, first, steps, spelling)
 
 
 @compiled

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from .language import Node, counters_of
+from .lattice import Lattice
 from .words import Letter, Reflection, Word
 
 TOLERANCES = (0.02, 0.05, 0.1, 0.2, 0.4)  # of the canvas, in the order in which they are tried
@@ -74,6 +75,7 @@ class Direction:
 class Candidate:
     """One word a layer, the topmost first, and the counters that made them (IMAW15 5.1).
 
+    lattices: what each layer may have instead of its word, words with the same letters.
     unsized: ranges of the unsized symbols' sizes (m) that eq. 7 leaves, a bounding box.
     parts: numbers of layers of the alignment groups that stand in it one after another.
     """
@@ -82,6 +84,7 @@ class Candidate:
     counters: tuple[tuple[str, int], ...] = ()
     unsized: tuple[tuple[str, float, float], ...] = ()
     parts: tuple[int, ...] = ()
+    lattices: tuple[Lattice, ...] = ()
 
     def split(self) -> list[tuple[int, int]]:
         """Return first and end layer of every group."""
@@ -118,7 +121,10 @@ class Alignment:
         """Return the alignment of one of its groups; Ω and Σ stay those of the whole."""
         first, end = self.candidate.split()[index]
         candidate = replace(
-            self.candidate, words=self.candidate.words[first:end], parts=(end - first,)
+            self.candidate,
+            words=self.candidate.words[first:end],
+            lattices=self.candidate.lattices[first:end],
+            parts=(end - first,),
         )
         lines = dict.fromkeys(line[first:end] for line in self.borders)
         return replace(self, candidate=candidate, borders=tuple(lines))

@@ -7,12 +7,19 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
+from ..randomness import item_generator
 from .alignment import Aligner, Effort, Found, Key, Task, full_key
 from .candidates import Generator
+from .evaluation import evaluate
 from .problem import SLACK, TOLERANCES, Alignment, Candidate, Direction
+from .sizing import conflict
+from .words import Word
 
 BUDGETS = (0.0, 1 / 16, 1 / 4, 1.0)  # of µ: Ω is looked for from below
-QUICK = Effort(labels=20_000, steps=400_000, nodes=64, beam=24)
+QUICK = Effort(labels=20_000, steps=400_000, nodes=32, beam=24)
+UNITS = 8  # lengths that sizes are rounded to, at most
+GLANCE = Effort(labels=10_000, steps=400_000, nodes=6, beam=12)
+PROVING = 0.65  # share of the time after which an answer goes before a proof
 MAX_CANDIDATES = 100_000  # kept of one group at one tolerance
 
 Accept = Callable[[Alignment], bool]
@@ -43,17 +50,19 @@ class Clock:
 
     until: float = float("inf")
     late: bool = field(default=False)
+    now: Callable[[], float] = time.monotonic
 
     def over(self, ahead: float = 0.0) -> bool:
         """Tell whether the time is up, or will be in some seconds."""
-        self.late = self.late or time.monotonic() > self.until
-        return self.late or time.monotonic() + ahead > self.until
+        now = self.now()
+        self.late = self.late or now > self.until
+        return self.late or now + ahead > self.until
 
     def share(self, part: float) -> Clock:
         """Return a clock for a part of the time that is left."""
-        now = time.monotonic()
+        now = self.now()
         left = self.until - now
-        return Clock(self.until if left == float("inf") else now + part * left)
+        return Clock(self.until if left == float("inf") else now + part * left, now=self.now)
 
 
 class GroupSearch:
@@ -68,8 +77,10 @@ class GroupSearch:
     ) -> None:
         self.direction, self.groups, self.clock = direction, groups, clock
         self.effort = effort or Effort()
-        self.aligner = Aligner(direction, lambda ahead: self.clock.over(ahead))
+        self.aligner = Aligner(direction, lambda ahead: self.clock.over(ahead), clock.now)
+        self.exhausted = False  # whether everything has been tried that may have a layout
         self._kept: dict[float, tuple[list[Candidate], Generator]] = {}
+        self._floors: dict[Stage, float] = {}  # of Ω, where a stage is not searched to its end
 
     def answer(self) -> Answer | None:
         """Return the best alignment at the first tolerance that has any, or None.
@@ -78,7 +89,7 @@ class GroupSearch:
         """
         proved = cleared = True
         first = self.clock
-        self.clock = first.share(0.5)
+        self.clock = first.share(PROVING)
         for stage in STAGES:
             found = self.at(stage)
             proved = proved and found.complete
@@ -93,7 +104,8 @@ class GroupSearch:
                 break
         else:
             self.clock = first
-            return None if proved else self._rescued(stage)
+            self.exhausted = proved
+            return None if proved else self._rescued(STAGES[0])
         self.clock = first
         return self._rescued(stage)
 
@@ -107,7 +119,13 @@ class GroupSearch:
 
     def _finished(self, found: Found, proved: bool) -> Answer | None:
         assert found.alignment is not None
-        return Answer(found.alignment, proved, 0.0 if proved else found.alignment.omega)
+        return self._answered(found.alignment, proved)
+
+    def _answered(self, best: Alignment, proved: bool) -> Answer:
+        """Return an answer with the gap between its Ω and the least that may have been missed."""
+        missed = [floor for stage, floor in self._floors.items() if stage <= _stage_of(best)]
+        floor = best.omega if proved else min([best.omega, *missed])
+        return Answer(best, proved, max(0.0, best.omega - floor))
 
     def _rescued(self, stuck: Stage) -> Answer | None:
         """Answer quickly by beams, then go on with the exact search while there is time."""
@@ -119,8 +137,9 @@ class GroupSearch:
             if found.alignment is not None:
                 if best is None or self._before(found.alignment, best):
                     best = found.alignment
-                return Answer(best, False, best.omega)
-        return None if best is None else Answer(best, False, best.omega)
+                return self._answered(best, False)
+            self._floors.setdefault(stage, 0.0)
+        return None if best is None else self._answered(best, False)
 
     def _before(self, a: Alignment, b: Alignment) -> bool:
         return self._rank(a) < self._rank(b)
@@ -132,22 +151,95 @@ class GroupSearch:
         """Try beams on every candidate, each stage within its share of the time."""
         whole = self.clock
         stages = STAGES[STAGES.index(stuck) :]
-        best: Alignment | None = None
+        best = self._secured()
+        if best is not None:
+            stages = tuple(stage for stage in stages if stage <= _stage_of(best))
         for left, stage in zip(range(len(stages), 0, -1), stages, strict=True):
-            self.clock = whole.share(0.8 / left)
-            for candidate in self.candidates(stage.tolerance):
-                budget = stage.tolerance * self.direction.canvas
-                found = self._align(candidate, stage, budget, QUICK)
-                if found.alignment is not None and (
-                    best is None or self._before(found.alignment, best)
-                ):
-                    best = found.alignment
-                if self.clock.over():
-                    break
-            if best is not None or whole.over():
+            share = whole.share(0.8 / left)
+            for tried, clock in ((self.candidates, share.share(0.5)), (self._sampled, share)):
+                self.clock = clock
+                best = self._best_beam(tried(stage.tolerance), stage, best)
+            if whole.over() or (best is not None and _stage_of(best) <= stage):
                 break
         self.clock = whole
         return best
+
+    def _secured(self) -> Alignment | None:
+        """Return any alignment, soon: the first that beams find at the greatest tolerance."""
+        whole = self.clock
+        for stage in STAGES[-2:]:
+            self.clock = whole.share(0.25)
+            budget = stage.tolerance * self.direction.canvas
+            for candidate in self._sampled(stage.tolerance):
+                found = None
+                if self._hopeful(candidate, stage, budget):
+                    found = self._rounded(candidate, stage)
+                    found = found or self._align(candidate, stage, budget, GLANCE).alignment
+                if found is not None:
+                    self.clock = whole
+                    return self._tightened(found)
+        self.clock = whole
+        return None
+
+    def _rounded(self, candidate: Candidate, stage: Stage) -> Alignment | None:
+        """Return an alignment that is exact for sizes rounded to a unit, or None.
+
+        Such an alignment always has a sizing, which is what most of those near Ω = µ lack.
+        """
+        direction, found = self.direction, []
+        bounds = Generator(direction, self.groups, stage.tolerance).bounds(candidate.words)
+        most = (stage.tolerance + SLACK) * direction.canvas
+        for unit in _units(direction, candidate):
+            task = Task(candidate, tuple(bounds), stage.tolerance, 0.0, stage.splits, GLANCE)
+            aligner = Aligner(_in_units(direction, unit), self.clock.over, self.clock.now)
+            path = aligner.best(task).alignment
+            if path is None:
+                continue
+            point = {name: (size, size) for name, size in path.sizes}
+            own = evaluate(direction, path.candidate, path.borders, path.tolerance, point)
+            own = replace(own, sizes=path.sizes)
+            parts = [own.part(i) for i in range(len(candidate.parts))]
+            wide = [abs(sigma - direction.canvas) for sigma in part_sigmas(direction, own)]
+            if max(wide) <= most and own.omega <= most and conflict(direction, parts) is None:
+                found.append(own)
+        return min(found, key=self._rank, default=None)
+
+    def _tightened(self, found: Alignment) -> Alignment:
+        """Return an alignment at the least tolerance that admits it."""
+        if len(found.candidate.parts) > 1:
+            return found
+        canvas = self.direction.canvas
+        for tolerance in TOLERANCES:
+            most = (tolerance + SLACK) * canvas
+            generator = Generator(self.direction, self.groups, tolerance)
+            sizes = dict(found.sizes)
+            fits = all(
+                row.least <= size <= row.greatest
+                for row in generator.bounds(found.candidate.words)
+                for size in [row.known + sum(n * sizes[name] for name, n in row.counts)]
+            )
+            if fits and found.omega <= most and abs(found.sigma - canvas) <= most:
+                return replace(found, tolerance=tolerance)
+        return found
+
+    def _best_beam(
+        self, candidates: Iterator[Candidate], stage: Stage, best: Alignment | None
+    ) -> Alignment | None:
+        """Return the best of what beams find among candidates, while the clock lets them."""
+        budget = stage.tolerance * self.direction.canvas
+        for candidate in candidates:
+            if self.clock.over():
+                break
+            if self._hopeful(candidate, stage, budget if best is None else best.omega):
+                found = self._align(candidate, stage, budget, QUICK).alignment
+                if found is not None and (best is None or self._before(found, best)):
+                    best = found
+        return best
+
+    def _sampled(self, tolerance: float) -> Iterator[Candidate]:
+        """Yield candidates at random, until the clock stops them: few of very many are seen."""
+        generator = Generator(self.direction, self.groups, tolerance, self.clock.over)
+        yield from generator.sampled(item_generator(0, "layer-solve", *self.groups))
 
     def candidates(self, tolerance: float) -> Iterator[Candidate]:
         """Yield the candidates at a tolerance; the first MAX_CANDIDATES are kept."""
@@ -167,12 +259,15 @@ class GroupSearch:
     def at(self, stage: Stage) -> Found:
         """Return the best alignment at one tolerance, with or without splits."""
         complete = True
+        cleared = 0.0  # no alignment has a smaller Ω
         for share in BUDGETS:
             budget = share * stage.tolerance * self.direction.canvas
             found = self._within(stage, budget)
             complete = complete and found.complete
+            cleared = max(cleared, found.bound) if complete else cleared
+            self._floors[stage] = float("inf") if complete else cleared
             if found.alignment is not None or self.clock.over():
-                return replace(found, complete=complete and found.complete)
+                return replace(found, complete=complete)
         return Found(None, complete)
 
     def _within(self, stage: Stage, budget: float) -> Found:
@@ -180,7 +275,7 @@ class GroupSearch:
         complete = True
         for candidate in self.candidates(stage.tolerance):
             if self.clock.over():
-                return Found(best, False)
+                return Found(best, False, 0.0)
             limit = budget if best is None else best.omega
             if not self._hopeful(candidate, stage, limit):
                 continue
@@ -191,7 +286,8 @@ class GroupSearch:
             ):
                 best = found.alignment
         kept = self._kept.get(stage.tolerance)
-        return Found(best, complete and kept is not None and kept[1].complete)
+        complete = complete and kept is not None and kept[1].complete
+        return Found(best, complete, budget if complete and best is None else 0.0)
 
     def all_at(self, tolerance: float, splits: bool) -> Iterator[Alignment]:
         """Yield the best alignment of every candidate that has one, while there is time."""
@@ -206,14 +302,47 @@ class GroupSearch:
 
     def _hopeful(self, candidate: Candidate, stage: Stage, budget: float) -> bool:
         """Tell whether a lower bound on Ω leaves room: see `least_omega`."""
+        most = budget + SLACK * self.direction.canvas
         return (
-            least_omega(self.direction, candidate, stage) <= budget + SLACK * self.direction.canvas
+            least_omega(self.direction, candidate, stage) <= most
+            and lacking(self.direction, candidate, stage) <= most
         )
 
     def _align(self, candidate: Candidate, stage: Stage, budget: float, effort: Effort) -> Found:
         bounds = Generator(self.direction, self.groups, stage.tolerance).bounds(candidate.words)
         task = Task(candidate, tuple(bounds), stage.tolerance, budget, stage.splits, effort)
         return self.aligner.best(task)
+
+
+def part_sigmas(direction: Direction, whole: Alignment) -> list[float]:
+    """Return Σ column sizes (m) of every group of an alignment."""
+    point = {name: (size, size) for name, size in whole.sizes}
+    parts = [whole.part(i) for i in range(len(whole.candidate.parts))]
+    return [
+        evaluate(direction, one.candidate, one.borders, one.tolerance, point).sigma for one in parts
+    ]
+
+
+def _units(direction: Direction, candidate: Candidate) -> list[float]:
+    """Return lengths (m) that sizes may be rounded to multiples of, the finest first."""
+    used = {a.symbol for word in candidate.words for a in word}
+    sizes = {direction.rules[name].size for name in used} - {None}
+    units = {round(size / part, 9) for size in sizes if size for part in (1, 2)}
+    return sorted(units)[:UNITS]
+
+
+def _in_units(direction: Direction, unit: float) -> Direction:
+    rules = {
+        name: rule
+        if rule.size is None
+        else replace(rule, size=unit * max(1, round(rule.size / unit)))
+        for name, rule in direction.rules.items()
+    }
+    return replace(direction, rules=rules)
+
+
+def _stage_of(alignment: Alignment) -> Stage:
+    return Stage(alignment.tolerance, alignment.pieces > 0)
 
 
 def least_omega(direction: Direction, candidate: Candidate, stage: Stage) -> float:
@@ -226,12 +355,13 @@ def least_omega(direction: Direction, candidate: Candidate, stage: Stage) -> flo
     least: list[float] = []
     most: list[float] = []
     smallest = float("inf")
-    for word in candidate.words:
-        spans = [_span(direction, box, letter.symbol) for letter in word]
-        least.append(sum(low for low, _ in spans))
-        most.append(sum(high for _, high in spans))
-        opaque = [s[0] for s, a in zip(spans, word, strict=True) if direction.is_opaque(a)]
-        smallest = min([smallest, *opaque])
+    for words in _alternatives(candidate):
+        spans = [[_span(direction, box, letter.symbol) for letter in word] for word in words]
+        least.append(min(sum(low for low, _ in each) for each in spans))
+        most.append(max(sum(high for _, high in each) for each in spans))
+        for word, each in zip(words, spans, strict=True):
+            opaque = [s[0] for s, a in zip(each, word, strict=True) if direction.is_opaque(a)]
+            smallest = min([smallest, *opaque])
     room = direction.canvas * (1.0 + stage.tolerance + SLACK)
     total = 0.0
     for first, end in candidate.split():
@@ -239,6 +369,22 @@ def least_omega(direction: Direction, candidate: Candidate, stage: Stage) -> flo
         rows = zip(least[first:end], most[first:end], strict=True)
         total += max(0.0, *(widest - b for a, b in rows if room - a < smallest), 0.0)
     return total
+
+
+def lacking(direction: Direction, candidate: Candidate, stage: Stage) -> float:
+    """Return another lower bound on Ω (m): the length that no opaque letter covers.
+
+    Every column has an opaque substring, which is at most ω narrower than the column.
+    """
+    floor = direction.canvas * (1.0 - stage.tolerance - SLACK)
+    opaque = [max(map(direction.opaque_size, words)) for words in _alternatives(candidate)]
+    covered = [sum(opaque[first:end]) for first, end in candidate.split()]
+    return floor - min(covered)
+
+
+def _alternatives(candidate: Candidate) -> list[tuple[Word, ...]]:
+    """Return a word for each multiset of letters that each layer may have."""
+    return [lattice.words for lattice in candidate.lattices]
 
 
 def _span(

@@ -74,10 +74,12 @@ def solve_direction(direction: Direction, time_limit: float = TIME_LIMIT) -> Sol
 
 
 def _answers(direction: Direction, groups: tuple[str, ...], clock: Clock) -> dict[str, Answer]:
-    answer = GroupSearch(direction, groups, clock).answer()
+    search = GroupSearch(direction, groups, clock)
+    answer = search.answer()
     if answer is None:
         seconds = min(EXPLAINING, max(1.0, clock.until - time.monotonic()))
-        raise Infeasible(explanation(direction, groups, seconds, late=clock.late))
+        why = explanation(direction, groups, seconds, late=clock.late, proved=search.exhausted)
+        raise Infeasible(why)
     return _parted(direction, groups, answer)
 
 

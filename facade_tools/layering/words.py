@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import product
 from typing import Literal, NamedTuple
@@ -35,6 +35,7 @@ class Expansion:
     """How far to expand: words whose least size is at most `limit` (m).
 
     sizes: least size of every symbol (m, > 0). `transparent`: symbols that are always so.
+    most: words of one pattern. `late` tells when to stop, which leaves the rest out.
     """
 
     counters: Mapping[str, int]
@@ -42,6 +43,8 @@ class Expansion:
     limit: float
     reflection: Reflection = "reverse-mirror"
     transparent: frozenset[str] = frozenset()
+    most: int = MAX_WORDS
+    late: Callable[[], bool] = lambda: False
 
 
 class WordList(NamedTuple):
@@ -114,9 +117,9 @@ class _Expander:
 
     def _unique(self, words: list[Word]) -> list[Word]:
         kept = list(dict.fromkeys(words))
-        if len(kept) > MAX_WORDS:
+        if len(kept) > self.how.most:
             self.complete = False
-        return kept[:MAX_WORDS]
+        return kept[: self.how.most]
 
     def _sequence(self, parts: tuple[Node, ...], control: bool) -> list[Word]:
         words: list[Word] = [()]
@@ -131,10 +134,10 @@ class _Expander:
                 word = head + tail
                 if self._fits(word):
                     out[word] = None
-            if len(out) > MAX_WORDS:
+            if len(out) > self.how.most or self.how.late():
                 self.complete = False
                 break
-        return list(out)[:MAX_WORDS]
+        return list(out)[: self.how.most]
 
     def _power(self, base: Node, exponent: Exponent, control: bool) -> list[Word]:
         count = exponent.value(self.how.counters)
@@ -144,11 +147,12 @@ class _Expander:
         if count < 0:
             words = [reflected(word, self.how.reflection) for word in words]
         out: list[Word] = [()]
-        for _ in range(abs(count)):
-            longer = self._joined(out, words)
-            if longer == out:  # nothing, or the empty word, over and over
+        for digit in f"{abs(count):b}":  # by squaring: a long word is not built letter by letter
+            out = self._joined(out, out)
+            if digit == "1":
+                out = self._joined(out, words)
+            if not out:
                 break
-            out = longer
         return out
 
     def _substituted(self, inner: Node, contents: tuple[tuple[str, Node], ...]) -> list[Word]:
@@ -159,11 +163,11 @@ class _Expander:
         for picked in product(*choices):
             self.bound = dict(zip((name for name, _ in contents), picked, strict=True))
             out.update(dict.fromkeys(self._node(inner, True)))
-            if len(out) > MAX_WORDS:
+            if len(out) > self.how.most or self.how.late():
                 self.complete = False
                 break
         self.bound = outer
-        return list(out)[:MAX_WORDS]
+        return list(out)[: self.how.most]
 
 
 def least_size(node: Node, how: Expansion, ranges: Mapping[str, tuple[int, int]]) -> float:

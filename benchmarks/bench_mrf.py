@@ -1,6 +1,7 @@
 """`parse-image --method mrf` on real facades: rows, columns, window boxes, pixels, time, memory.
 
     python benchmarks/bench_mrf.py DATA [--convention ecp|cmp] [--step N] [--sheet PNG]
+    python benchmarks/bench_mrf.py DATA --forest default|NPZ        the trained method instead
 
 DATA holds images/ and labels/. Pictures whose windows are no grid (less than 90% of the cells of
 rows × columns hold one) are counted apart.
@@ -17,9 +18,10 @@ import cv2
 import numpy as np
 
 from facade_tools.artifacts.parse import LABELS
+from facade_tools.grammar.reading import ReadOptions
 from facade_tools.imaging.image_io import PICTURES, read_photo
 from facade_tools.imaging.label_views import overlay
-from facade_tools.reconstruction.mrf import Scale, read_facade
+from facade_tools.reconstruction.mrf import mrf_method
 from facade_tools.segmentation.conventions import convention
 from facade_tools.segmentation.evaluation import (
     Tally,
@@ -28,6 +30,7 @@ from facade_tools.segmentation.evaluation import (
     groups,
     overlaps,
 )
+from facade_tools.segmentation.parsing import forest_method
 
 WINDOW, WALL = LABELS.index("window"), LABELS.index("wall")
 
@@ -74,13 +77,17 @@ def main():
     parser.add_argument("--step", type=int, default=1, help="every N-th picture")
     parser.add_argument("--sheet", type=Path, help="overlays of the first 24 pictures")
     parser.add_argument("--bad", action="store_true", help="name what is wrong; sheet shows these")
+    parser.add_argument("--forest", help="measure this classifier with the default grammar")
     args = parser.parse_args()
     cv2.setNumThreads(1)
+    read = mrf_method(ReadOptions())
+    if args.forest:
+        read = forest_method(ReadOptions(None if args.forest == "default" else args.forest))
     every, grid, tiles, times = Tally(), Tally(), [], []
     right = whole = constant = 0
     for name, photo, truth in pairs(args.data, args.convention, args.step):
         start = time.process_time()
-        reading = read_facade(Scale(), photo, name, rng=np.random.default_rng(0))
+        reading = read(photo, name, rng=np.random.default_rng(0))
         times.append(time.process_time() - start)
         real, boxes = boxes_of_labels(truth), boxes_of_regions(reading.parse.regions)
         every.add(truth, reading.labels, real, boxes)

@@ -37,7 +37,7 @@ types: $(VENV)/.ready
 check: lint types test
 
 golden: $(VENV)/.ready
-	$(BIN)/python -m pytest -q tests/test_golden.py --update-golden
+	$(BIN)/python -m pytest -q tests/test_golden.py tests/test_retarget.py -k bytes --update-golden
 
 docs: $(VENV)/.ready
 	$(BIN)/python docs/make_reference.py
@@ -47,6 +47,7 @@ bench: $(VENV)/.ready
 
 samples: $(VENV)/.ready
 	$(BIN)/python sample_data/make_samples.py
+	$(BIN)/python sample_data/make_textured.py
 
 # The Khronos glTF validator, which the tests ask where it is installed (needs node).
 judges: build/node_modules/gltf-validator

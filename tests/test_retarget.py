@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -316,3 +318,29 @@ def test_several_styles_and_the_same_bytes_again(facade, tmp_path):
         )  # fmt: skip
         assert done.returncode == 0, done.stderr
     assert (tmp_path / "1/b.glb").read_bytes() == (tmp_path / "2/b.glb").read_bytes()
+
+
+GOLDEN = Path(__file__).parent / "golden" / "styles"
+
+
+@pytest.mark.parametrize("name", ["corner-house", "l-block"])
+def test_bytes_of_sample_styles(facade, tmp_path, name, update_golden):
+    """The sheets of the samples; refreshed by `make golden` with --update-golden."""
+    out = tmp_path / name
+    done = facade("capture-style", SAMPLES / name / "model.obj", "-o", out)
+    assert done.returncode == 0, done.stderr
+    for part in ("stylesheet.json", "blocks.json"):
+        golden = GOLDEN / f"{name}.{part}"
+        if update_golden:
+            golden.parent.mkdir(exist_ok=True)
+            golden.write_bytes((out / part).read_bytes())
+        assert (out / part).read_bytes() == golden.read_bytes(), "changed: review, `make golden`"
+
+
+def test_samples_are_made_again_byte_for_byte(tmp_path):
+    script = SAMPLES.parent / "make_textured.py"
+    subprocess.run([sys.executable, script, "--out", tmp_path], check=True, timeout=60)
+    made = {p.relative_to(tmp_path): p.read_bytes() for p in tmp_path.rglob("*") if p.is_file()}
+    kept = {p.relative_to(SAMPLES): p.read_bytes() for p in SAMPLES.rglob("*") if p.is_file()}
+    assert made == kept
+    assert sum(len(data) for data in kept.values()) < 1_000_000

@@ -54,7 +54,7 @@ def slabs(vertices: Points3, faces: Triangles) -> list[Slab]:
     roof) are left out. Raises InvalidInput where nothing encloses a plan.
     """
     levels = clustered_levels(vertices[np.unique(faces), 2])
-    model = _Model(vertices[faces], bodies(vertices, faces))
+    model = _model(vertices[faces], bodies(vertices, faces))
     found = []
     for bottom, top in itertools.pairwise(levels):
         slab = _slab(model, float(bottom), float(top))
@@ -121,15 +121,23 @@ def _clusters(values: Floats, tolerance: float) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class _Model:
-    """Triangles (m, 3, 3) and the number of each one's body (m,)."""
+    """Triangles (m, 3, 3), each one's body, and its least and greatest height (m,)."""
 
     triangles: Floats
     bodies: Integers
+    low: Floats
+    high: Floats
+
+
+def _model(triangles: Floats, numbers: Integers) -> _Model:
+    heights = triangles[:, :, 2]
+    return _Model(triangles, numbers, heights.min(axis=1), heights.max(axis=1))
 
 
 def _slab(model: _Model, bottom: float, top: float) -> Slab:
     middle = 0.5 * (bottom + top)
-    segments, crossing = section(model.triangles, middle)
+    crossing = np.flatnonzero((model.high > middle) & (model.low <= middle))
+    segments = section(model.triangles[crossing], middle)
     if not len(segments):
         empty = np.zeros(2)
         return Slab(bottom, top, empty, empty, np.zeros((1, 1), dtype=bool))
@@ -158,14 +166,8 @@ def _upright(triangles: Floats) -> Booleans:
     return np.asarray(np.abs(normal[:, 2]) < 0.1 * np.linalg.norm(normal, axis=1))
 
 
-def section(triangles: Floats, height: float) -> tuple[Floats, Integers]:
-    """Return where triangles (m, 3, 3) meet the plane z = height.
-
-    Segments (n, 2, 2), and the index of the triangle of each (n,).
-    """
-    z = triangles[:, :, 2]
-    crossing = np.flatnonzero((z.max(axis=1) > height) & (z.min(axis=1) <= height))
-    t = triangles[crossing]
+def section(t: Floats, height: float) -> Floats:
+    """Return the segments (m, 2, 2) in which triangles (m, 3, 3) cross the plane z = height."""
     z = t[:, :, 2] - height
     above = z > 0
     lone = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), (~above).argmax(axis=1))
@@ -175,7 +177,7 @@ def section(triangles: Floats, height: float) -> tuple[Floats, Integers]:
         other = (lone + step) % 3
         share = z[rows, lone] / (z[rows, lone] - z[rows, other])
         ends.append(t[rows, lone, :2] + share[:, None] * (t[rows, other, :2] - t[rows, lone, :2]))
-    return (np.stack(ends, axis=1) if len(t) else np.empty((0, 2, 2))), crossing
+    return np.stack(ends, axis=1) if len(t) else np.empty((0, 2, 2))
 
 
 def _lines(segments: Floats, axis: int, tolerance: float) -> Floats:

@@ -8,8 +8,8 @@ import numpy as np
 from ..geometry.arrays import Booleans, Floats
 
 PLACES, LINES = 1024, 24  # samples along and across the direction of repeat
-SURE = 0.45  # correlation at one period
-RISE = 0.15  # of the correlation between the dip before and the peak
+# a period is clear with this correlation and this rise from the dip before
+CLEAR = ((0.45, 0.15), (0.3, 0.4))
 NEARLY = 0.85  # of the best peak: the shortest such period is taken
 SHORTEST = 0.6  # m
 AROUND = 8.0  # m: changes over longer distances are light, not rhythm
@@ -50,7 +50,11 @@ def period(samples: Floats, size: float) -> float | None:
         if score[k] > score[k - 1] and score[k] >= score[k + 1]
     ]
     lowest = np.minimum.accumulate(score)
-    clear = [k for k in peaks if score[k] > SURE and score[k] - lowest[k] > RISE]
+    clear = [
+        k
+        for k in peaks
+        if any(score[k] > sure and score[k] - lowest[k] > rise for sure, rise in CLEAR)
+    ]
     if not clear:
         return None
     best = max(score[k] for k in clear)

@@ -1,8 +1,10 @@
 """Parses from annotated pictures: label maps forced into a grammar of floors.
 
     python benchmarks/annotated_parses.py DATA [--convention ecp] [--limit N] -o parses.jsonl
+    python benchmarks/annotated_parses.py DATA --convention cmp --void sky -o parses.jsonl
 
-DATA holds images/ and labels/. Nine tenths of the belief of a pixel go to its label.
+DATA holds images/ and labels/. Nine tenths of the belief of a pixel go to its label. CMP calls
+what is not the facade, mostly sky, background.
 """
 
 from __future__ import annotations
@@ -30,7 +32,7 @@ ROWS, PIXELS = 288, 160_000
 CLASSES = LABELS[1:]
 
 
-def parse_of(photo, labels, identity, made):
+def parse_of(photo, labels, identity, made, grammar):
     height, width = labels.shape
     scale = min(1.0, ROWS / height, (PIXELS / (height * width)) ** 0.5)
     size = (round(width * scale), round(height * scale))
@@ -44,8 +46,7 @@ def parse_of(photo, labels, identity, made):
     floors = floors_of(tree)
     return Parse(
         identity, ImageInfo(photo.name, (width, height), photo.sha256), IDENTITY, "annotation",
-        "dp", made.grammar.id if hasattr(made, "grammar") else "haussmann-floors", "",
-        float(solution.energy), size, regions_of(tree), floors,
+        "dp", grammar, "", float(solution.energy), size, regions_of(tree), floors,
         max((floor.columns for floor in floors), key=len, default=()), derivation=tree,
     )  # fmt: skip
 
@@ -55,6 +56,7 @@ def main():
     parser.add_argument("data", type=Path)
     parser.add_argument("--convention", default="ecp")
     parser.add_argument("--grammar", default="haussmann-floors")
+    parser.add_argument("--void", default="outlier", help="label of pixels without a class")
     parser.add_argument("--limit", type=int, default=10**6)
     parser.add_argument("-o", "--output", type=Path, required=True)
     args = parser.parse_args()
@@ -65,8 +67,9 @@ def main():
     with args.output.open("wb") as file:
         for path in pictures:
             labels = classes.read(str(args.data / "labels" / f"{path.stem}.png"))
+            labels[labels == 0] = LABELS.index(args.void)
             try:
-                parse = parse_of(read_photo(str(path)), labels, path.stem, made)
+                parse = parse_of(read_photo(str(path)), labels, path.stem, made, args.grammar)
             except FacadeError as error:
                 print(f"{path.name}: {error}")
                 continue

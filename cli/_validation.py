@@ -20,6 +20,8 @@ from ._stream import open_sink
 # Kind of artifact -> function that yields the problems of its geometry.
 RULES = {
     "building": "facade_tools.geometry.checks:building_problems",
+    "derivation": "facade_tools.reconstruction.records:derivation_problems",
+    "shape-grammar": "facade_tools.reconstruction.rules:grammar_problems",
 }
 
 

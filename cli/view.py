@@ -20,6 +20,7 @@ DRAWINGS = {
     "stylesheet": "facade_tools.stylization.drawing:sheet_picture",
     "parse": "facade_tools.imaging.label_views:parse_view",
     "derivation": "facade_tools.reconstruction.records:derivation_scene",
+    "shape-grammar": "facade_tools.reconstruction.records:grammar_scene",
 }
 WITH_FILES = ("stylesheet",)  # their function takes the artifact's folder too
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ from facade_tools.reconstruction.engine import Lot, derive
 from facade_tools.reconstruction.expressions import evaluated, number
 from facade_tools.reconstruction.library import builtin_names, load
 from facade_tools.reconstruction.operators import Measure
-from facade_tools.reconstruction.records import derivation_of, derivation_scene
+from facade_tools.reconstruction.records import derivation_of, derivation_problems, derivation_scene
 from facade_tools.reconstruction.roofing import RoofPlan, roof_over
 from facade_tools.reconstruction.scopes import Scope, Shape, faces_of
 from facade_tools.reconstruction.volumes import standing
@@ -340,6 +341,21 @@ def test_a_derivation_is_an_artifact_that_draws():
     mass = scene.meshes[0]
     assert trimesh.Trimesh(mass.vertices, mass.faces).volume == pytest.approx(144.0)
     assert {mesh.material for mesh in scene.meshes} == {"mass", "Wall", "Window"}
+
+
+def test_problems_of_grammars_and_derivations(facade_here, tmp_path):
+    sample = SAMPLES / "twisted-tower.yaml"
+    assert facade_here("validate", sample).returncode == 0
+    assert facade_here("view", sample, "-o", tmp_path / "x.png", "--size", "80x60").returncode == 0
+    (tmp_path / "bad.yaml").write_text(sample.read_text().replace("into: Entrance", "into: Hall"))
+    found = facade_here("validate", tmp_path / "bad.yaml")
+    assert found.returncode == 3
+    assert b"'Hall' is neither a rule nor a terminal" in found.stdout
+    artifact = derivation_of(derived(BOX), grammar(BOX), "b")
+    assert list(derivation_problems(artifact)) == []
+    open_ = replace(artifact, mass=replace(artifact.mass, faces=artifact.mass.faces[1:]))
+    assert "not closed" in next(iter(derivation_problems(open_)))[1]
+    assert next(iter(derivation_problems(replace(artifact, terminals={}))))[0] == "/terminals"
 
 
 # --- refusals -------------------------------------------------------------------------------------

@@ -29,8 +29,8 @@ class Operation:
     """One procedure of a right-hand side.
 
     First the scope is turned into a `box`, stood `upright`, moved, scaled, turned about its middle,
-    extruded, in this order; then it is cut by at most one of split, repeat, mirror, faces, roof. `into` names
-    what becomes of it. Sizes are metres, angles degrees.
+    extruded, in this order; then it is cut by at most one of split, repeat, mirror, faces, roof.
+    `into` names what becomes of it. Sizes are metres, angles degrees.
     """
 
     box: bool = False

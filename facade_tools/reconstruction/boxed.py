@@ -54,7 +54,7 @@ def derived_building(
     volumes = standing(derived.volumes)
     boxes = tuple(_boxes(volumes))
     if not boxes:
-        raise InvalidInput("the derivation has no volume; expected an extruded footprint")
+        raise InvalidInput("no volume is wide and high enough for a box (0.6 m, 0.5 m)")
     storey = min(storey_height, round(1.99 * min(box.height or 0.0 for box in boxes), 4))
     bare = Building(identity, boxes, {}, storey)
     sides = frozenset(known)

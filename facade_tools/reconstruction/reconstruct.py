@@ -21,7 +21,7 @@ from .elevation import Elevation, elevation, label_map, stretched
 from .engine import Derived, Leaf, Lot, derive
 from .records import derivation_of
 from .specific import Cover, Design, Specific, specific_grammar
-from .surfaces import TILE_METRES, Surfaces, canvas_of, surfaces_of
+from .surfaces import TILE_METRES, Surfaces, canvas_of, colors_of, surfaces_of
 
 DEPTH = 12.0  # metres, of the default footprint
 
@@ -93,7 +93,8 @@ def reconstruct(
         plan = stretched(plan, width, top)
     else:
         lots = [_rectangle(plan.width, ask.depth)]
-    surfaces = surfaces_of(canvas_of(picture, labels, plan), plan, rng=rng)
+    colors = colors_of(picture, labels)
+    surfaces = surfaces_of(canvas_of(picture, labels, plan), plan, colors, rng=rng)
     design = Design(_roof(plan, ask), surfaces.axes, ask.party, surfaces.colors)
     specific = specific_grammar(plan, design, parse.id)
     derived = derive(specific.grammar, lots, rng=rng)

@@ -12,8 +12,9 @@ from ..artifacts.grammar import Geometry, Node
 from ..artifacts.shape_grammar import ShapeGrammar
 from ..geometry.mesh import Material, Mesh, Scene
 from ..geometry.solids import Label, Solid, triangulated
-from .drawing import color_of, mass_of
-from .engine import Derived
+from ..randomness import item_generator
+from .drawing import color_of, derived_scene, mass_of
+from .engine import Derived, derive
 from .skins import Skins
 
 PLACES = 9  # decimals of metres
@@ -58,6 +59,37 @@ def derivation_scene(derivation: Derivation) -> Scene:
     }
     meshes = (Mesh("mass", points, faces, "mass"), *skins.meshes())
     return Scene(derivation.id, meshes, {"mass": Material("mass", "#cfc6b2"), **materials})
+
+
+def grammar_scene(grammar: ShapeGrammar) -> Scene:
+    """Return the scene of a building that a grammar makes (seed 0)."""
+    derived = derive(grammar, rng=item_generator(0, "view", grammar.id))
+    return derived_scene(derived, grammar.id)
+
+
+def derivation_problems(derivation: Derivation) -> Iterator[tuple[str, str]]:
+    """Yield what is wrong with a derivation's geometry: pointer and message."""
+    edges = Counter(
+        (a, b)
+        for face in derivation.mass.faces
+        for ring in face
+        for a, b in zip(ring, ring[1:] + ring[:1], strict=True)
+    )
+    count = len(derivation.mass.points)
+    if any(max(edge) >= count for edge in edges):
+        yield "/mass/faces", f"names a point that is not there; there are {count}"
+    elif any(number != 1 or edges[b, a] != 1 for (a, b), number in edges.items()):
+        yield "/mass/faces", "the solid is not closed: an edge without its counterpart"
+    for leaf in _leaves(derivation.root):
+        geometry = leaf.geometry
+        if leaf.symbol not in derivation.terminals:
+            yield "/terminals", f"has no {leaf.symbol!r}, the symbol of a leaf"
+            return
+        if geometry and max((k for f in geometry.faces for r in f for k in r), default=-1) >= len(
+            geometry.points
+        ):
+            yield "/root", f"a face of a leaf {leaf.symbol!r} names a point that is not there"
+            return
 
 
 def _leaves(node: Node) -> Iterator[Node]:

@@ -43,6 +43,14 @@ def check_shape_grammar(grammar: ShapeGrammar) -> None:
                 _check_expression(amount, names, place)
 
 
+def grammar_problems(grammar: ShapeGrammar) -> Iterator[tuple[str, str]]:
+    """Yield the first thing that is wrong with a grammar: pointer and message."""
+    try:
+        check_shape_grammar(grammar)
+    except InvalidInput as error:
+        yield error.place.pointer, error.message
+
+
 def _check_operation(operation: Operation, pointer: str) -> None:
     cuts = [name for name in CUTS if getattr(operation, name)]
     if len(cuts) > 1:

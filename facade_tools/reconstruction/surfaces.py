@@ -80,9 +80,10 @@ def canvas_of(photo: Picture, labels: Labels, plan: Elevation) -> Canvas:
     return Canvas(picture, index, scale)
 
 
-def surfaces_of(canvas: Canvas, plan: Elevation, *, rng: np.random.Generator) -> Surfaces:
-    """Return all textures of a reconstruction."""
-    colors = dict(_colors(canvas))
+def surfaces_of(
+    canvas: Canvas, plan: Elevation, colors: Mapping[str, str], *, rng: np.random.Generator
+) -> Surfaces:
+    """Return all textures of a reconstruction; colors: of the labels (see `colors_of`)."""
     clean = replace(canvas, picture=_cleaned(canvas, plan))
     axes, strips = _axes(clean, plan)
     pictures = {PHOTO: canvas.picture, FRONT: clean.picture}
@@ -103,9 +104,12 @@ def surfaces_of(canvas: Canvas, plan: Elevation, *, rng: np.random.Generator) ->
     return Surfaces(materials, colors, axes)
 
 
-def _colors(canvas: Canvas) -> Iterator[tuple[str, str]]:
-    for label, default in COLORS.items():
-        yield label, median_color(canvas.picture[canvas.labels == LABELS.index(label)], default)
+def colors_of(picture: Picture, labels: Labels) -> dict[str, str]:
+    """Return the median colour of every label in a picture of the labels' shape."""
+    return {
+        label: median_color(picture[labels == LABELS.index(label)], default)
+        for label, default in COLORS.items()
+    }
 
 
 # --- the front ------------------------------------------------------------------------------------

@@ -220,8 +220,11 @@ def compare(rows: list[Attributes], options: Any, splits: int, seed: int) -> Any
 
 
 def write_report(model: Model, rows: list[Attributes], table: Any, path: str, seed: int) -> None:
-    """Write the HTML report of a model."""
+    """Write the HTML report of a model, with two buildings of each style."""
     from facade_tools.artifacts.writing import write_bytes
     from facade_tools.exteriors.report import report_page
+    from facade_tools.exteriors.style_pictures import style_pictures
 
-    write_bytes(Path(path), report_page(model, rows, table, seed=seed).encode())
+    pictures = list(style_pictures(model, seed=seed)) if rows else []
+    page = report_page(model, rows, table, seed=seed, pictures=pictures)
+    write_bytes(Path(path), page.encode())

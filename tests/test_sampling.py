@@ -11,6 +11,7 @@ import pytest
 from facade_tools.artifacts.attributes import Attributes, Bounds, ElementAttributes, Present
 from facade_tools.artifacts.documents import encode
 from facade_tools.artifacts.numbers import Given, dump_line
+from facade_tools.artifacts.provenance import Provenance
 from facade_tools.artifacts.validation import check
 from facade_tools.errors import Infeasible, InvalidInput
 from facade_tools.exteriors.conditioning import draw_given
@@ -19,6 +20,7 @@ from facade_tools.exteriors.drawing import SampleOptions, sample_attributes
 from facade_tools.exteriors.evaluation import negative_log_density
 from facade_tools.exteriors.learning import LearnOptions, learn_model
 from facade_tools.exteriors.prior import shipped_prior
+from facade_tools.exteriors.sample_lines import sample_lines
 from facade_tools.exteriors.serialisation import network_of
 
 
@@ -213,3 +215,38 @@ def test_min_distance_keeps_samples_apart(model):
     assert distances(points, finder.training()).min() >= 0.49
     with pytest.raises(Infeasible):
         draw(model, 5, min_distance=50.0)
+
+
+# --- lines and shared values --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("options", [{}, {"neighbours": False, "style": 1}, {"top": True}])
+def test_columns_write_the_same_bytes_as_artifacts(model, options):
+    provenance = Provenance("sample", 3, {"odd": 'per cent % "quoted" \x00'}, ())
+    chosen = SampleOptions(**options, prefix="%", first=7)
+    wanted = [
+        dump_line(encode(replace(row, provenance=provenance)))
+        for row in sample_attributes(model, 40, rng=np.random.default_rng(2), options=chosen)
+    ]
+    found = sample_lines(
+        model, 40, rng=np.random.default_rng(2), given=None, options=chosen, provenance=provenance
+    )
+    assert [line for _, line in found] == wanted
+
+
+def test_shared_values_come_back_as_often_as_they_are_seen(houses):
+    """Ceilings of exactly 2.4384 or 5.1816 m in three of four houses."""
+    rng = np.random.default_rng(0)
+    rows = []
+    for house in houses[:160]:
+        w, d, h = house.mass.bbox
+        h = (2.4384 if h < 4 else 5.1816) + (0.0 if rng.random() < 0.75 else rng.normal(0, 0.05))
+        rows.append(replace(house, mass=replace(house.mass, bbox=(w, d, h))))
+    options = LearnOptions(variant="no-lateral", largest=3)
+    model = learn_model(rows, rng=rng, options=options)
+    heights = [a.mass.bbox[2] for a in draw(model, 400)]
+    exact = [h in (2.4384, 5.1816) for h in heights if min(abs(h - 2.44), abs(h - 5.18)) < 0.2]
+    assert 0.5 < np.mean(exact) < 0.95
+    assert not any(a.mass.bbox[2] in (2.4384, 5.1816) for a in draw(model, 400, smooth=True))
+    given = Attributes("g", mass=replace(Attributes("x").mass, bbox=(9.0, None, 2.44)))
+    assert {a.mass.bbox[2] for a in draw(model, 20, given=given)} == {2.44}

@@ -1,7 +1,8 @@
-"""The report of a learned model: one HTML file, all pictures inline SVG, no script."""
+"""The report of a learned model: one HTML file, all pictures inline, no script."""
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Iterable, Iterator, Sequence
 from html import escape
 from math import cos, pi, sin
@@ -12,11 +13,11 @@ from ..artifacts.attributes import Attributes
 from ..artifacts.model import Model
 from ..randomness import item_generator
 from .coordinates import Floats, Readings, read_attributes
-from .drawing import SampleOptions, sample_attributes
 from .holdout import Comparison
 from .layout import Layout
 from .sampling import draw_block
 from .serialisation import network_of
+from .style_pictures import StylePicture
 
 STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:70em;margin:2em auto;padding:0 1em;
 color:#222}h1,h2{font-weight:600}table{border-collapse:collapse}td,th{padding:.2em .8em;
@@ -27,12 +28,18 @@ BINS = 24
 
 
 def report_page(
-    model: Model, rows: Sequence[Attributes], comparison: Sequence[Comparison], *, seed: int = 0
+    model: Model,
+    rows: Sequence[Attributes],
+    comparison: Sequence[Comparison],
+    *,
+    seed: int = 0,
+    pictures: Iterable[StylePicture] = (),
 ) -> str:
     """Return the HTML page of a model learned from `rows` (none: of a table).
 
-    Cardinalities, lateral edges, score trace, two samples a style, marginals of data and samples,
-    and the held-out table where there is one.
+    Cardinalities, lateral edges, score trace, samples of each style (`pictures`; a sample without
+    a picture is drawn as a glyph), marginals of data and samples, and the held-out table where
+    there is one.
     """
     parts = [
         f"<h1>Model of {model.count} buildings ({escape(model.variant)})</h1>",
@@ -44,7 +51,7 @@ def report_page(
         parts.append("<h2>Held-out negative log-likelihood (nats a building)</h2>")
         parts.append(held_out(comparison))
     if rows:
-        parts.append("<h2>Two samples of each style</h2>" + "".join(style_glyphs(model, seed)))
+        parts.append("<h2>Samples of each style</h2>" + "".join(style_figures(model, pictures)))
         parts.append(
             "<h2>Data (blue) and samples (red)</h2>" + "".join(marginals(model, rows, seed))
         )
@@ -133,13 +140,16 @@ def trace_graph(trace: Sequence[float]) -> str:
 # --- samples ------------------------------------------------------------------------------------
 
 
-def style_glyphs(model: Model, seed: int) -> Iterator[str]:
-    """Yield two glyphs a style: plan box with garage and porches, elevation with its glazing."""
-    for style, share in enumerate(model.style):
-        options = SampleOptions(style=style, prefix=f"style {style}", neighbours=False)
-        rng = item_generator(seed, "report", style)
-        for sample in sample_attributes(model, 2, rng=rng, options=options):
-            yield figure(glyph(sample), f"style {style} ({share:.0%})")
+def style_figures(model: Model, pictures: Iterable[StylePicture]) -> Iterator[str]:
+    """Yield a figure a sample: its building, or else its glyph."""
+    for one in pictures:
+        caption = f"style {one.style} ({model.style[one.style]:.0%})"
+        yield figure(glyph(one.sample) if one.png is None else png_image(one.png), caption)
+
+
+def png_image(data: bytes) -> str:
+    """Return an inline picture."""
+    return f"<img alt='' src='data:image/png;base64,{b64encode(data).decode()}'>"
 
 
 def glyph(a: Attributes) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..artifacts.model import Model
 from .coordinates import Bits, Floats
-from .dataset import Ints, Masks
+from .dataset import Masks
 from .groups import ATOM_TOLERANCE
 from .neighbours import training_readings
 from .network import Network
@@ -21,6 +21,7 @@ from .network import Network
 LEAST = 3  # training buildings that make a value a shared one
 REACH = 2.0  # least standard deviations within which training buildings count as near
 FAR = 5.0
+AROUND = 8
 DIGITS = 9  # to which values are compared
 
 
@@ -45,8 +46,9 @@ def shared_values(model: Model, network: Network) -> tuple[SharedValues, ...]:
     for g, (values, group) in enumerate(zip(readings.values, network.layout.groups, strict=True)):
         for i, coordinate in enumerate(group.coordinates):
             column = values[:, i]
-            column = np.sort(column[_dense(column, coordinate.atoms)].round(DIGITS))
-            _, place, counts = np.unique(column, return_inverse=True, return_counts=True)
+            column = np.sort(column[_dense(column, coordinate.atoms)])
+            alike = column.round(DIGITS)  # may differ from the value itself in the last bit
+            _, place, counts = np.unique(alike, return_inverse=True, return_counts=True)
             shared = counts[place.reshape(-1)] >= LEAST
             if shared.any():
                 reach = REACH * coordinate.floor
@@ -63,28 +65,23 @@ def take_up(
 ) -> None:
     """Move draws (own units), in place, onto shared values near them.
 
-    Of the training buildings within reach one is drawn; where there is none, the nearest is taken
-    unless it is `FAR` times as far. If its value is a shared one, it takes the draw's place.
+    Of the training buildings within reach, and at least the `AROUND` next ones on either side, one
+    is drawn; if its value is a shared one and not `FAR` times as far, it takes the draw's place.
     fixed (n, d) a group: 1 where a value is given and must stay.
     """
     for one in coordinates:
         column = values[one.group][:, one.index]
-        first = np.searchsorted(one.values, column - one.reach, side="left")
-        last = np.searchsorted(one.values, column + one.reach, side="right")
-        drawn = first + (rng.random(len(column)) * (last - first)).astype(np.int64)
-        drawn = np.where(last > first, np.minimum(drawn, last - 1), _nearest(one.values, column))
+        place = np.searchsorted(one.values, column)
+        low = np.searchsorted(one.values, column - one.reach, side="left")
+        high = np.searchsorted(one.values, column + one.reach, side="right")
+        low = np.maximum(np.minimum(low, place - AROUND), 0)
+        high = np.minimum(np.maximum(high, place + AROUND), len(one.values))
+        drawn = low + (rng.random(len(column)) * (high - low)).astype(np.int64)
         near = np.abs(one.values[drawn] - column) <= FAR * one.reach
         moved = _dense(column, one.atoms) & near & one.shared[drawn]
         if fixed is not None:
             moved &= fixed[one.group][:, one.index] == 0
         column[moved] = one.values[drawn[moved]]
-
-
-def _nearest(values: Floats, column: Floats) -> Ints:
-    """Return the index (n,) of the value nearest to each draw."""
-    above = np.searchsorted(values, column).clip(1, len(values) - 1)
-    lower = column - values[above - 1] < values[above] - column
-    return np.asarray(np.where(lower, above - 1, above))
 
 
 def _dense(column: Floats, atoms: tuple[float, ...]) -> Masks:

@@ -1,4 +1,4 @@
-# ruff: noqa: B905, C901, E501
+# ruff: noqa: B905, C901
 """An independent, slow reading of what CONTRACT.md says `layer-solve` minimises.
 
 Words are enumerated outright, every partition is built column by column, linear programmes give
@@ -404,7 +404,9 @@ def reference_sizes(direction, alignments):
             for row, cells in enumerate(column):
                 line = np.zeros(len(place))
                 for c in cells:
-                    line[place[(g, row, c.letter, j) if c.piece else words[row][c.letter].symbol]] += 1
+                    line[
+                        place[(g, row, c.letter, j) if c.piece else words[row][c.letter].symbol]
+                    ] += 1
                 if cells:
                     lines.append(line)
             rows += [other - lines[0] for other in lines[1:]]

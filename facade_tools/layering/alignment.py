@@ -16,7 +16,8 @@ from . import kernels, kernels_labels
 from .candidates import Bounds
 from .evaluation import Borders, Line, crossings, evaluate, least_error
 from .lattice import Lattice, chain
-from .problem import SLACK, Alignment, Candidate, Direction, Rule, Span
+from .paths import Path, decoded, joined_borders
+from .problem import SLACK, Alignment, Candidate, Direction, Rule
 from .rows import Integers, RowMaker, Rows, TooLarge
 from .sizing import conflict
 from .words import Letter, Word
@@ -30,7 +31,7 @@ FIRST_STEPS = 300_000
 GROWTH = 8
 MOST_LABELS = 500_000
 MOST_STEPS = 60_000_000
-MOST_NODES = 4000
+MOST_NODES = 30_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,7 +211,7 @@ class Aligner:
                 return None, complete
             lines.append(found.borders)
             words += found.words
-        joined = _joined(lines)
+        joined = joined_borders(lines)
         candidate = replace(task.candidate, words=tuple(words))
         path = evaluate(self.direction, candidate, joined, task.tolerance, node.box)
         if len(lines) == 1 and node.box:
@@ -221,7 +222,7 @@ class Aligner:
 
     def _group(
         self, lattices: tuple[Lattice, ...], task: Task, node: _Node, part: int, ease: float
-    ) -> tuple[_Path | None, bool]:
+    ) -> tuple[Path | None, bool]:
         strict = self._limits(task, False, ease, bool(node.box))
         merged = self.maker.rows(lattices, node.box, True, task.splits)
         twins = len(merged.lattices) < len(lattices)
@@ -285,7 +286,7 @@ class Aligner:
 
     def _run(
         self, rows: Rows, task: Task, limits: Integers, forbidden: tuple[int, ...]
-    ) -> tuple[_Path | None, bool]:
+    ) -> tuple[Path | None, bool]:
         labels, steps = FIRST_LABELS, FIRST_STEPS
         while True:
             capacity = np.array([labels, labels], np.int64)
@@ -302,9 +303,7 @@ class Aligner:
             if not (full or long) or most or self.late(GROWTH * (self.now() - started)):
                 break
             labels, steps = labels * (GROWTH if full else 1), steps * (GROWTH if long else 1)
-        return (_decoded(rows, codes) if len(codes) else None), bool(
-            status[kernels_labels.COMPLETE]
-        )
+        return (decoded(rows, codes) if len(codes) else None), bool(status[kernels_labels.COMPLETE])
 
     def _examine(
         self, path: Alignment, node: _Node, task: Task
@@ -396,46 +395,3 @@ class Aligner:
                 before, after = map(np.uint64, keys)
                 total += int(kernels.row_hash(row, before, after, int(a.inside) + int(b.inside)))
         return total & (2**64 - 1)
-
-
-@dataclass(frozen=True, slots=True)
-class _Path:
-    """What a search has found for one group: the word of every layer, and the borders."""
-
-    words: tuple[Word, ...]
-    borders: Borders
-
-
-def _decoded(rows: Rows, codes: Any) -> _Path:
-    owner = {layer: row for row, layers in enumerate(rows.layers) for layer in layers}
-    depths = rows.places[codes >> 2, kernels_labels.DEPTH].tolist()
-    spans = [[Span(depth >> 1, bool(depth & 1)) for depth in line] for line in depths]
-    words = [_word_of(rows, codes, row) for row in range(len(rows.lattices))]
-    layers = sorted(owner)
-    return _Path(
-        tuple(words[owner[layer]] for layer in layers),
-        tuple(tuple(line[owner[layer]] for layer in layers) for line in spans),
-    )
-
-
-def _word_of(rows: Rows, codes: Any, row: int) -> Word:
-    lattice = rows.lattices[row]
-    if lattice.single:
-        return lattice.word
-    offset = sum(len(other.edges) for other in rows.lattices[:row])
-    edges = kernels_labels.spelt(
-        np.arange(len(codes)), row, codes, rows.places, rows.first, rows.steps, rows.spelling
-    )
-    return tuple(lattice.edges[edge - offset].letter for edge in edges)
-
-
-def _joined(parts: list[Borders]) -> Borders:
-    """Put the columns of groups one after another: the rows of the others stand still."""
-    ends = [part[-1] for part in parts]
-    begins = [part[0] for part in parts]
-    out: list[tuple[Span, ...]] = []
-    for i, part in enumerate(parts):
-        head = [span for end in ends[:i] for span in end]
-        tail = [span for begin in begins[i + 1 :] for span in begin]
-        out += [(*head, *line, *tail) for line in (part if i == 0 else part[1:])]
-    return tuple(out)

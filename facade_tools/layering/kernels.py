@@ -237,7 +237,7 @@ def _row_order(m: int, solid: Array) -> Any:
 
 
 @compiled
-def _finish(
+def _finish(  # noqa: C901 - called once a column
     m: int, rows: Array, places: Array, tally: Array, keys: Array, steps: Array, spelling: Any,
     forbidden: Array, limits: Array, labels: Array, reach: Array, codes: Array, head: Array,
     chain: Array, bucket: Array, slots: Array, first: Array, status: Array,

@@ -226,7 +226,7 @@ def spelt(
 
 
 @compiled
-def segment_before(a: int, b: int, spelling: Any) -> bool:
+def segment_before(a: Any, b: Any, spelling: Any) -> bool:
     """Tell whether a segment's word comes before another's of the same length."""
     ranks, heads, tails = spelling[0], spelling[1], spelling[2]
     while a >= 0 and b >= 0:
@@ -294,7 +294,7 @@ def lifted(a: int, labels: Array, limits: Array) -> Any:
 
 @compiled
 def wins(
-    a: int, b: int, m: int, labels: Array, codes: Array, limits: Array, places: Array,
+    a: Any, b: Any, m: int, labels: Array, codes: Array, limits: Array, places: Array,
     first: Array, steps: Array, spelling: Any,
 ) -> bool:  # fmt: skip
     """Tell whether a complete label goes before another: Ω, pieces, columns, Σ, names."""

@@ -81,7 +81,9 @@ SOURCE, TARGET, SEGMENT, CLEAR_STEP, SOLID_STEP, BARE_STEP, GRIPS_STEP, BEHIND, 
 
 
 @compiled
-def column_steps(size: int, edges: Array, segments: Array, splits: bool, most: int) -> Any:
+def column_steps(  # noqa: C901 - one table, row by row
+    size: int, edges: Array, segments: Array, splits: bool, most: int
+) -> Any:
     """Return (steps, count): what a row can have in a column, from each place to another.
 
     Places are the nodes, then (splits) the insides of transparent edges in their order. Whole
@@ -149,7 +151,7 @@ def column_steps(size: int, edges: Array, segments: Array, splits: bool, most: i
 
 @compiled
 def _step(
-    table: Array, at: int, source: int, target: int, segment: int, behind: int, ahead: int
+    table: Array, at: Any, source: Any, target: Any, segment: Any, behind: Any, ahead: Any
 ) -> None:
     table[at, SOURCE], table[at, TARGET], table[at, SEGMENT] = source, target, segment
     table[at, BEHIND], table[at, AHEAD] = behind, ahead

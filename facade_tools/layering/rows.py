@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import blake2b
 from typing import NamedTuple
@@ -378,11 +378,11 @@ def _hashes(tally: Integers, hashes: Keys) -> Keys:
     return out
 
 
-def _grown(make: object) -> Integers:
+def _grown(make: Callable[[int], tuple[Integers, int]]) -> Integers:
     """Return a table of whatever length it needs. Raises TooLarge."""
     most = FIRST_SEGMENTS
     while True:
-        table, count = make(most)  # type: ignore[operator]
+        table, count = make(most)
         if count <= most:
             kept: Integers = table[:count]
             return kept

@@ -10,15 +10,13 @@ from typing import NamedTuple
 from ..randomness import item_generator
 from .alignment import Aligner, Effort, Found, Key, Task, full_key
 from .candidates import Generator
-from .evaluation import evaluate
+from .lattice import FEW_WORDS
 from .problem import SLACK, TOLERANCES, Alignment, Candidate, Direction
-from .sizing import conflict
+from .rescue import GLANCE, Rescue
 from .words import Word
 
 BUDGETS = (0.0, 1 / 16, 1 / 4, 1.0)  # of µ: Ω is looked for from below
 QUICK = Effort(labels=20_000, steps=400_000, nodes=32, beam=24)
-UNITS = 8  # lengths that sizes are rounded to, at most
-GLANCE = Effort(labels=10_000, steps=400_000, nodes=6, beam=12)
 PROVING = 0.65  # share of the time after which an answer goes before a proof
 MAX_CANDIDATES = 100_000  # kept of one group at one tolerance
 
@@ -74,7 +72,10 @@ class GroupSearch:
         groups: tuple[str, ...],
         clock: Clock,
         effort: Effort | None = None,
+        few: float = FEW_WORDS,
     ) -> None:
+        """Search; `few`: patterns with more words are searched as lattices, not word by word."""
+        self.few = few
         self.direction, self.groups, self.clock = direction, groups, clock
         self.effort = effort or Effort()
         self.aligner = Aligner(direction, lambda ahead: self.clock.over(ahead), clock.now)
@@ -170,57 +171,18 @@ class GroupSearch:
         for stage in STAGES[-2:]:
             self.clock = whole.share(0.25)
             budget = stage.tolerance * self.direction.canvas
+            rng = item_generator(1, "layer-solve", *self.groups)
+            rescue = Rescue(self.direction, self.groups, self.clock.over, self.clock.now)
             for candidate in self._sampled(stage.tolerance):
                 found = None
                 if self._hopeful(candidate, stage, budget):
-                    found = self._rounded(candidate, stage)
+                    found = rescue.rounded(candidate, *stage, rng=rng)
                     found = found or self._align(candidate, stage, budget, GLANCE).alignment
                 if found is not None:
                     self.clock = whole
-                    return self._tightened(found)
+                    return rescue.tightened(found)
         self.clock = whole
         return None
-
-    def _rounded(self, candidate: Candidate, stage: Stage) -> Alignment | None:
-        """Return an alignment that is exact for sizes rounded to a unit, or None.
-
-        Such an alignment always has a sizing, which is what most of those near Ω = µ lack.
-        """
-        direction, found = self.direction, []
-        bounds = Generator(direction, self.groups, stage.tolerance).bounds(candidate.words)
-        most = (stage.tolerance + SLACK) * direction.canvas
-        for unit in _units(direction, candidate):
-            task = Task(candidate, tuple(bounds), stage.tolerance, 0.0, stage.splits, GLANCE)
-            aligner = Aligner(_in_units(direction, unit), self.clock.over, self.clock.now)
-            path = aligner.best(task).alignment
-            if path is None:
-                continue
-            point = {name: (size, size) for name, size in path.sizes}
-            own = evaluate(direction, path.candidate, path.borders, path.tolerance, point)
-            own = replace(own, sizes=path.sizes)
-            parts = [own.part(i) for i in range(len(candidate.parts))]
-            wide = [abs(sigma - direction.canvas) for sigma in part_sigmas(direction, own)]
-            if max(wide) <= most and own.omega <= most and conflict(direction, parts) is None:
-                found.append(own)
-        return min(found, key=self._rank, default=None)
-
-    def _tightened(self, found: Alignment) -> Alignment:
-        """Return an alignment at the least tolerance that admits it."""
-        if len(found.candidate.parts) > 1:
-            return found
-        canvas = self.direction.canvas
-        for tolerance in TOLERANCES:
-            most = (tolerance + SLACK) * canvas
-            generator = Generator(self.direction, self.groups, tolerance)
-            sizes = dict(found.sizes)
-            fits = all(
-                row.least <= size <= row.greatest
-                for row in generator.bounds(found.candidate.words)
-                for size in [row.known + sum(n * sizes[name] for name, n in row.counts)]
-            )
-            if fits and found.omega <= most and abs(found.sigma - canvas) <= most:
-                return replace(found, tolerance=tolerance)
-        return found
 
     def _best_beam(
         self, candidates: Iterator[Candidate], stage: Stage, best: Alignment | None
@@ -238,7 +200,7 @@ class GroupSearch:
 
     def _sampled(self, tolerance: float) -> Iterator[Candidate]:
         """Yield candidates at random, until the clock stops them: few of very many are seen."""
-        generator = Generator(self.direction, self.groups, tolerance, self.clock.over)
+        generator = Generator(self.direction, self.groups, tolerance, self.clock.over, self.few)
         yield from generator.sampled(item_generator(0, "layer-solve", *self.groups))
 
     def candidates(self, tolerance: float) -> Iterator[Candidate]:
@@ -246,7 +208,7 @@ class GroupSearch:
         if tolerance in self._kept:
             yield from self._kept[tolerance][0]
             return
-        generator = Generator(self.direction, self.groups, tolerance, self.clock.over)
+        generator = Generator(self.direction, self.groups, tolerance, self.clock.over, self.few)
         kept: list[Candidate] = []
         for candidate in generator.candidates():
             kept.append(candidate)
@@ -312,33 +274,6 @@ class GroupSearch:
         bounds = Generator(self.direction, self.groups, stage.tolerance).bounds(candidate.words)
         task = Task(candidate, tuple(bounds), stage.tolerance, budget, stage.splits, effort)
         return self.aligner.best(task)
-
-
-def part_sigmas(direction: Direction, whole: Alignment) -> list[float]:
-    """Return Σ column sizes (m) of every group of an alignment."""
-    point = {name: (size, size) for name, size in whole.sizes}
-    parts = [whole.part(i) for i in range(len(whole.candidate.parts))]
-    return [
-        evaluate(direction, one.candidate, one.borders, one.tolerance, point).sigma for one in parts
-    ]
-
-
-def _units(direction: Direction, candidate: Candidate) -> list[float]:
-    """Return lengths (m) that sizes may be rounded to multiples of, the finest first."""
-    used = {a.symbol for word in candidate.words for a in word}
-    sizes = {direction.rules[name].size for name in used} - {None}
-    units = {round(size / part, 9) for size in sizes if size for part in (1, 2)}
-    return sorted(units)[:UNITS]
-
-
-def _in_units(direction: Direction, unit: float) -> Direction:
-    rules = {
-        name: rule
-        if rule.size is None
-        else replace(rule, size=unit * max(1, round(rule.size / unit)))
-        for name, rule in direction.rules.items()
-    }
-    return replace(direction, rules=rules)
 
 
 def _stage_of(alignment: Alignment) -> Stage:

@@ -10,11 +10,11 @@ from itertools import islice, product
 from ..artifacts.design import Canvas, Design
 from ..artifacts.layout import Group, Layout
 from ..errors import Infeasible
-from .alignment import full_key, prepare
+from .alignment import Key, full_key, prepare
 from .evaluation import evaluate
 from .explain import explanation
 from .language import counters_of, symbols_of
-from .problem import Alignment, Direction
+from .problem import Direction
 from .search import Answer, Clock, GroupSearch
 from .shapes import Line, PlacedLetter, grid_of
 from .sizing import Sizing, conflict, solve, substring_sizes
@@ -232,18 +232,31 @@ def _axes(width: float | None, height: float | None) -> Sequence[tuple[Axis, flo
 
 
 def _direction_variations(direction: Direction, time_limit: float) -> Iterator[Solved]:
+    """Yield the best solution, then those with other words in one of the groups at a time."""
     best = solve_direction(direction, time_limit)
     yield best
-    if len(direction.groups) > 1:
-        return
-    (group,) = direction.groups
     clock = Clock(time.monotonic() + time_limit)
-    search = GroupSearch(direction, (group,), clock)
-    answer = best.answers[group]
-    found: list[Alignment] = [
-        one
-        for one in search.all_at(answer.alignment.tolerance, answer.alignment.pieces > 0)
-        if one.candidate.words != answer.alignment.candidate.words
-    ]
-    for one in sorted(found, key=lambda one: full_key(one, direction.canvas)):
-        yield Solved(direction, {group: Answer(one, answer.optimal)}, solve(direction, [one]))
+    found: list[tuple[Key, dict[str, Answer]]] = []
+    for groups in components(direction):
+        found += _others(direction, groups, best, clock)
+    for _, answers in sorted(found, key=lambda one: one[0]):
+        alignments = [answer.alignment for answer in answers.values()]
+        yield Solved(direction, answers, solve(direction, alignments))
+
+
+def _others(
+    direction: Direction, groups: tuple[str, ...], best: Solved, clock: Clock
+) -> Iterator[tuple[Key, dict[str, Answer]]]:
+    """Yield answers of all groups, of which some have other words than the best one."""
+    own = [best.answers[group] for group in groups]
+    words = tuple(word for answer in own for word in answer.alignment.candidate.words)
+    search = GroupSearch(direction, groups, clock, few=float("inf"))
+    splits = any(answer.alignment.pieces > 0 for answer in own)
+    for one in search.all_at(own[0].alignment.tolerance, splits):
+        if one.candidate.words == words:
+            continue
+        changed = _parted(direction, groups, Answer(one, own[0].optimal))
+        answers = {name: changed.get(name, answer) for name, answer in best.answers.items()}
+        together = [answer.alignment for answer in answers.values()]
+        if len(together) == 1 or conflict(direction, together) is None:
+            yield full_key(one, direction.canvas), answers

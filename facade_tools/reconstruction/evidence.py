@@ -94,16 +94,18 @@ def along_columns(signal: NDArray[np.float64], sigma: float) -> NDArray[np.float
     return np.asarray(smooth[:, 0], np.float64)
 
 
-def agreement(plane: Plane, across: NDArray[np.float64], blur: float) -> NDArray[np.float64]:
+def agreement(
+    plane: Plane, across: NDArray[np.float64], blur: float, faint: float = 1.0
+) -> NDArray[np.float64]:
     """Return how much every row agrees with a profile of columns, −1..1; faint rows agree less.
 
     blur: standard deviation in pixels along the row, of both: a window's frame and its pane are
-    one then.
+    one then. faint: the share of the median row's length at which a row counts half.
     """
     rows = _along_rows(plane, blur).astype(np.float64)
     length = np.sqrt((rows**2).sum(axis=1))
     pattern = along_columns(across, blur)
-    return np.asarray(rows @ pattern / (length + float(np.median(length)) + 1e-9))
+    return np.asarray(rows @ pattern / (length + faint * float(np.median(length)) + 1e-9))
 
 
 def strength(plane: Plane, blur: float) -> NDArray[np.float64]:

@@ -95,7 +95,7 @@ def in_cells(
     evidence = window_evidence(working, _shrunk(mask, working.shape[:2]))
     height = len(working)
     found, reach = segments(working, evidence.seen), max(2, int(REACH * height))
-    rows = agreement(evidence.plane, profiles(evidence.plane)[1], 3.0)
+    rows = agreement(evidence.plane, profiles(evidence.plane)[1], 3.0, 0.5)
     sky = skyline(differences(found, reach), rows)
     colour = differences(found, reach, sky)
     cell = _cell(scale, rows[sky:], height - sky)

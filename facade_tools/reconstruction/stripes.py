@@ -26,6 +26,7 @@ from .storeys import Band, Facade
 STRIPE = (5, 30)  # cells: widths of a stripe, 0.5 to 3 m
 GAP = 60  # cells: the widest wall between two stripes
 WEIGHTS = Weights(alpha=3.0, beta=0.4, boundary=0.05, gap=0.03, content=0.2)
+EDGE = 0.15  # of the usual evidence: a stripe ends where it falls below
 COST = 0.25  # of a stripe
 CELL_SHARE = 0.4  # of the usual evidence: from here a cell holds a window
 ROOF_BLUR = 2.0  # cells: a dormer's frame and its pane are one
@@ -42,7 +43,7 @@ def stripes(facade: Facade, *, gaps: bool = True) -> Chain:
     """
     across = profiles(facade.plane[facade.sky :])[1]
     evidence = across / (np.percentile(across, 95) + 1e-9)
-    return _chain(facade.picture[facade.sky :], evidence, gaps=gaps)
+    return _chain(facade.picture[facade.sky :], evidence - EDGE, gaps=gaps)
 
 
 def _chain(picture: Floats, evidence: Floats, *, gaps: bool) -> Chain:

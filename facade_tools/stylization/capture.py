@@ -182,8 +182,7 @@ def _wall(side: Side, block: int, first: int, part: Part, dressed: _Dressed) -> 
     floor_of = {slab: first + k for k, slab in enumerate(part.plans)}
     own = [i for i, f in enumerate(faces) if f.side == side and f.block == block]
     own.sort(key=lambda i: (faces[i].slab, direction * faces[i].start, faces[i].place))
-    boundary = float(part.high[depth] if sign > 0 else part.low[depth])
-    depths = [abs(boundary - faces[i].place) for i in own] or [0.0]
+    depths = _depths(part, depth, sign)
     lines = tuple(
         _polyline([faces[i] for i in own if faces[i].slab == k], part, side) for k in part.plans
     )
@@ -202,6 +201,23 @@ def _wall(side: Side, block: int, first: int, part: Part, dressed: _Dressed) -> 
         for i in own
     )
     return Wall(f"block-{block}", side, Thickness(min(depths), max(depths)), lines, styled)
+
+
+def _depths(part: Part, axis: int, sign: int) -> list[float]:
+    """Return how deep (m) one looks into a block from a side before a wall stops the view.
+
+    axis: 0 from left or right, 1 from front or back; sign: +1 from the greater coordinates.
+    """
+    found = []
+    for plan in part.plans.values():
+        lines, cells = (plan.xs, plan.cells) if axis == 0 else (plan.ys, plan.cells.T)
+        seen = cells[cells.any(axis=1)]
+        if sign > 0:
+            places = part.high[axis] - lines[::-1][seen[:, ::-1].argmax(axis=1)]
+        else:
+            places = lines[seen.argmax(axis=1)] - part.low[axis]
+        found += [float(place) for place in places]
+    return found
 
 
 def _polyline(faces: Sequence[WallFace], part: Part, side: Side) -> tuple[tuple[float, ...], ...]:

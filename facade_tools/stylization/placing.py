@@ -22,6 +22,7 @@ from .structure import candidates, match_blocks
 
 TOUCH = 1e-6  # m
 SUPPORT = 0.9  # of the distance of the outer boundaries: thickness of a wall under an overhang
+FLUSH = 0.05  # m: walls nearer than that stand in one plane, and thinning would take all relief
 SAME = 0.02  # share of the plan, of the height: storeys that differ less are one storey repeated
 Knots = tuple[Floats, Floats]
 
@@ -249,7 +250,7 @@ def _thinned(
     outer, inner = lower.moved(axis, np.array(bounds)).tolist()
     distance = reach - outer if bounds[1] > bounds[0] else outer - reach
     thickness = abs(inner - outer)
-    if thickness < TOUCH or not 0 <= distance < thickness:
+    if not FLUSH < distance < thickness:
         return []
     sign = 1.0 if bounds[1] > bounds[0] else -1.0
     knots = [(bounds[0], outer), (bounds[1], outer + sign * SUPPORT * distance)]

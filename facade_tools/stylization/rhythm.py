@@ -109,8 +109,7 @@ def breaks(samples: Floats, step: float) -> tuple[int, int]:
     n, lag = len(samples), round(step)
     like = _likeness(samples, lag)
     width = max(1, round(0.25 * step))
-    like = cv2.blur(like.reshape(1, -1), (width, 1)).ravel()
-    alien = like < BREAK
+    alien = np.asarray(cv2.blur(like.reshape(1, -1), (width, 1)).ravel() < BREAK)
     long = max(2, round(step / 3))
     middle = (n - lag) // 2
     first = _last_run(alien[:middle][::-1], long)

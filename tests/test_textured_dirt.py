@@ -234,3 +234,17 @@ def test_dirty_models_give_closed_solids():
     edges = np.sort(body.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     _, counts = np.unique(edges, axis=0, return_counts=True)
     assert (counts == 2).all()
+
+
+def test_collada_is_read_quietly(tmp_path, capfd):
+    """Nothing of COLLADA reading reaches standard error by itself."""
+    import trimesh
+
+    path = write_box(tmp_path / "a", picture=png())
+    data = trimesh.exchange.dae.export_collada(trimesh.load_mesh(path))
+    lost = data.replace(b"<library_images>", b"<library_images><image id='x'><init_from>lost.png"
+                        b"</init_from></image>")  # fmt: skip
+    (tmp_path / "house.dae").write_bytes(lost)
+    mesh = read_textured(tmp_path / "house.dae")
+    assert np.ptp(mesh.vertices, axis=0).max() == pytest.approx(12)
+    assert capfd.readouterr().err == ""

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +14,7 @@ import numpy as np
 from ..errors import InvalidInput
 from ..geometry.arrays import Floats
 from ..imaging.image_io import Picture
-from .textured import GREY, Paint, TexturedMesh, Textures, joined, read_bytes
+from .textured import GREY, Paint, TexturedMesh, joined, read_bytes
 from .textured_obj import read_obj
 
 ENDINGS = (".obj", ".glb", ".gltf", ".ply", ".dae")
@@ -50,11 +53,11 @@ def _collada_frame(head: str) -> Floats:
 def _through_trimesh(path: Path) -> TexturedMesh:
     import trimesh
 
-    try:
-        scene = trimesh.load_scene(path, process=False)
-    except Exception as error:  # trimesh raises whatever its parsers raise
-        raise InvalidInput(f"cannot be read as a mesh: {error}").at(str(path)) from None
-    textures = Textures(path.parent)
+    with _complaints() as notes:
+        try:
+            scene = trimesh.load_scene(path, process=False)
+        except Exception as error:  # trimesh raises whatever its parsers raise
+            raise InvalidInput(f"cannot be read as a mesh: {error}").at(str(path)) from None
     parts = []
     for node in scene.graph.nodes_geometry:
         transform, name = scene.graph[node]
@@ -64,8 +67,28 @@ def _through_trimesh(path: Path) -> TexturedMesh:
     if not parts:
         raise InvalidInput("holds no faces; expected a mesh").at(str(path))
     mesh = joined(parts)
-    notes = (*mesh.notes, *textures.notes)
-    return TexturedMesh(mesh.vertices, mesh.faces, mesh.uv, mesh.paint, mesh.paints, notes)
+    said = (*mesh.notes, *dict.fromkeys(notes))
+    return TexturedMesh(mesh.vertices, mesh.faces, mesh.uv, mesh.paint, mesh.paints, said)
+
+
+@contextmanager
+def _complaints() -> Iterator[list[str]]:
+    """Collect what trimesh logs, with the reason, in place of printing it."""
+    notes: list[str] = []
+
+    class Collector(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            cause = f": {record.exc_info[1]}" if record.exc_info and record.exc_info[1] else ""
+            notes.append(f"{record.getMessage().splitlines()[0]}{cause}")
+
+    logger, collector = logging.getLogger("trimesh"), Collector(logging.WARNING)
+    propagate, logger.propagate = logger.propagate, False
+    logger.addHandler(collector)
+    try:
+        yield notes
+    finally:
+        logger.removeHandler(collector)
+        logger.propagate = propagate
 
 
 def _part(geometry: Any, transform: Floats) -> TexturedMesh:

@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping
 from functools import cache
 from importlib import import_module
+from math import isfinite
 from typing import Any, ClassVar, Protocol
 
 from ..errors import InvalidInput, Place
@@ -98,6 +99,12 @@ def _yaml_loader() -> Any:
                 seen.add(str(key.value))
             return super().construct_mapping(node, deep)
 
+        def construct_yaml_float(self, node: Any) -> Any:
+            value = super().construct_yaml_float(node)
+            return parse_float(repr(value)) if isfinite(value) else value
+
+    tag = "tag:yaml.org,2002:float"
+    Loader.add_constructor(tag, Loader.construct_yaml_float)
     return Loader
 
 

@@ -18,7 +18,8 @@ from facade_tools.artifacts.store import read
 from facade_tools.errors import InvalidInput
 from facade_tools.geometry.polygons import oriented, shape_of
 from facade_tools.geometry.roofs import union_patches
-from facade_tools.geometry.solids import Solid, building_solid, footprint_solid, triangulated
+from facade_tools.geometry.solids import Label, Solid, building_solid, footprint_solid, triangulated
+from facade_tools.geometry.solids_merge import Piece, merged
 from facade_tools.geometry.triangulate import triangulate_rings
 from facade_tools.geometry.triangulate_ears import clipped_ears
 
@@ -132,6 +133,37 @@ def test_hundreds_of_flat_footprints_have_the_area_that_shapely_says(kind: str) 
         assert closed_and_outward(vertices, triangles)
         # Corners that touch are drawn apart by 0.1 mm, so that every reader sees a manifold.
         assert volume_of(vertices, triangles) == pytest.approx(4.0 * plan.area, rel=3e-5)
+
+
+@pytest.mark.parametrize("style", catalogue.ROOF_STYLES)
+@pytest.mark.parametrize("kind", catalogue.POLYGON_KINDS)
+def test_roofs_on_random_plans_close(kind: str, style: str) -> None:
+    rng = np.random.default_rng(10)
+    for direction in ("x", "y") * 6:
+        rings = catalogue.random_polygon(rng, kind)
+        roof = catalogue.roofed(style, float(rng.choice((10, 35, 60))), direction)
+        footprint = Footprint("f", tuple(tuple(map(tuple, ring)) for ring in rings), 4.0, roof)
+        vertices, triangles, _ = triangulated(footprint_solid(footprint))
+        assert closed_and_outward(vertices, triangles)
+        assert volume_of(vertices, triangles) > 0
+
+
+def test_slivers_and_pinched_loops_leave_no_hole() -> None:
+    """A piece without width is a face of its own; a loop that comes back to a vertex is cut."""
+    vertices = np.array(
+        [(0, 0, 1), (4, 0, 1), (4, 4, 1), (0, 4, 1)]
+        + [(6, 1, 1), (6.001, 1, 1), (6.0005, 0.9999, 1)],  # clockwise, without area
+        dtype=np.float64,
+    )
+    pieces = [
+        Piece([[0, 1, 2, 3]], ("roof",), Label("roof")),
+        Piece([[4, 5, 6]], ("roof",), Label("roof")),
+    ]
+    solid = merged(vertices, pieces)
+    assert sorted(len(face[0]) for face in solid.faces) == [3, 4]
+    bow = np.array([(0, 0, 1), (4, 0, 1), (2, 2, 1), (4, 4, 1), (0, 4, 1)], dtype=np.float64)
+    parts = [Piece([[0, 1, 2]], ("r",), Label("roof")), Piece([[2, 3, 4]], ("r",), Label("roof"))]
+    assert sorted(len(face[0]) for face in merged(bow, parts).faces) == [3, 3]
 
 
 def test_every_sample_house_is_a_volume() -> None:

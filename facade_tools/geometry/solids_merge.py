@@ -13,6 +13,7 @@ from .polygons import signed_area
 from .solids_surface import Face, Label, Solid
 from .triangulate import flattened, newell_normal
 
+SLIVER = 1e-7  # m²
 Edge = tuple[int, int]
 
 
@@ -36,7 +37,9 @@ def merged(vertices: Points3, pieces: list[Piece]) -> Solid:
         for face in _joined(vertices, members):
             faces.append(face)
             labels.append(members[0].label)
-    return _compact(vertices, _without_straight(vertices, faces), labels)
+    rows = zip(_without_straight(vertices, faces), labels, strict=True)
+    kept = [(face, label) for face, label in rows if face]
+    return _compact(vertices, [face for face, _ in kept], [label for _, label in kept])
 
 
 def _joined(vertices: Points3, pieces: list[Piece]) -> list[Face]:
@@ -67,8 +70,21 @@ def _loops(vertices: Points3, edges: list[Edge], normal: Floats) -> list[list[in
     loops = []
     for start, _ in edges:
         if leaving[start]:
-            loops.append(_trace(start, leaving, flat))
+            loops += _simple(_trace(start, leaving, flat))
     return loops
+
+
+def _simple(loop: list[int]) -> list[list[int]]:
+    """Cut a loop where it comes back to a vertex, so that no loop visits one twice."""
+    found: list[list[int]] = []
+    open_loop: list[int] = []
+    for vertex in loop:
+        if vertex in open_loop:
+            place = open_loop.index(vertex)
+            found.append(open_loop[place:])
+            del open_loop[place:]
+        open_loop.append(vertex)
+    return [*found, open_loop]
 
 
 def _trace(start: int, leaving: dict[int, list[int]], flat: dict[int, Floats]) -> list[int]:
@@ -93,16 +109,21 @@ def _angle(ahead: Floats, back: Floats) -> float:
 
 
 def _nested(vertices: Points3, loops: list[list[int]], normal: Floats) -> list[Face]:
-    """Give each hole (clockwise loop) to the smallest outer loop around it."""
+    """Give each hole (clockwise loop) to the smallest outer loop around it.
+
+    A loop without area has no direction: it is a face of its own, so that nothing is left open.
+    """
     flats = [flattened(vertices[loop], normal) for loop in loops]
     areas = [signed_area(flat) for flat in flats]
-    outer = [k for k in range(len(loops)) if areas[k] > 0]
+    outer = [k for k in range(len(loops)) if areas[k] > -SLIVER]
     faces = {k: [tuple(loops[k])] for k in outer}
     for k in range(len(loops)):
-        if areas[k] <= 0:
-            around = [j for j in outer if _contains(flats[j], flats[k])]
+        if areas[k] <= -SLIVER:
+            around = [j for j in outer if areas[j] > SLIVER and _contains(flats[j], flats[k])]
             if around:
                 faces[min(around, key=lambda j: areas[j])].append(tuple(loops[k]))
+            else:
+                faces[k] = [tuple(loops[k])]
     return [tuple(rings) for rings in faces.values()]
 
 
@@ -129,7 +150,9 @@ def _without_straight(vertices: Points3, faces: list[Face]) -> list[Face]:
         for vertex, pairs in neighbours.items()
         if len(pairs) == 1 and _is_straight(vertices, vertex, *next(iter(pairs)))
     }
-    return [tuple(tuple(k for k in ring if k not in straight) for ring in face) for face in faces]
+    kept = [[tuple(k for k in ring if k not in straight) for ring in face] for face in faces]
+    # Of a face without width only two points may be left: then its neighbours meet there.
+    return [tuple(ring for ring in face if len(ring) > 2) for face in kept]
 
 
 def _is_straight(vertices: Points3, middle: int, start: int, end: int) -> bool:

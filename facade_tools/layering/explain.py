@@ -116,9 +116,12 @@ def _alone(direction: Direction, conflict: _Conflict) -> str:
     (row,) = conflict.rows
     who = f"layer {row.layer!r} (pattern {row.pattern!r})"
     alone = replace(direction, groups={"": (row,)})
-    if next(Generator(alone, ("",), TOLERANCES[-1]).candidates(), None) is None:
+    first = next(Generator(alone, ("",), TOLERANCES[-1]).candidates(), None)
+    if first is None:
         most = TOLERANCES[-1] * direction.canvas
         span = f"{direction.canvas - most:g} to {direction.canvas + most:g} m"
         return f"{who} has no word that is {span} long"
     marks = "".join(f", {_mark(mark)}" for mark in conflict.qualifiers)
+    clear = sorted({a.symbol for word in first.words for a in word if a.transparent})
+    marks += "".join(f", symbol {name!r} transparent" for name in clear)
     return f"{who} leaves holes: a column without an opaque symbol{marks}"

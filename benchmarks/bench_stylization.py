@@ -112,6 +112,7 @@ def peaks(render: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return np.empty(0), np.empty(0)
     power = np.correlate(signal, signal, "full")[n - 1 :] / (n - np.arange(n))
     lags = [k for k in range(3, n // 2) if power[k] > power[k - 1] and power[k] >= power[k + 1]]
+    lags = [k for k in lags if power[k] > 0]
     return np.array(lags), power[lags]
 
 
@@ -135,7 +136,10 @@ def outlined(vertices: np.ndarray, faces: np.ndarray) -> tuple[float, float]:
     for z in low + step * (np.arange(60) + 0.5):
         heights = triangles[:, :, 2]
         segments = section(triangles[(heights.max(axis=1) > z) & (heights.min(axis=1) <= z)], z)
-        lines = shapely.unary_union(shapely.linestrings(np.round(segments, 3)), grid_size=1e-3)
+        # a grid on which no drawn coordinate lies half-way, so that equal ends stay equal
+        snapped = np.round(segments / 0.00137) * 0.00137
+        snapped = snapped[(snapped[:, 0] != snapped[:, 1]).any(axis=1)]
+        lines = shapely.unary_union(shapely.linestrings(snapped))
         cells = shapely.get_parts(shapely.polygonize(shapely.get_parts(lines)))
         plan = shapely.unary_union(cells)
         volume += step * plan.area

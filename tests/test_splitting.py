@@ -14,6 +14,7 @@ from facade_tools.stylization.splitting import (
     merged,
     rule_of,
     split,
+    split_rule,
     two_means,
     variance_signal,
 )
@@ -49,7 +50,7 @@ def test_labels_are_the_exact_minimum(signal, smoothness):
 @given(signals)
 def test_two_means_is_the_best_cut(signal):
     low, high = two_means(signal)
-    assert low <= high
+    assert low <= high + 1e-12
     cost = np.minimum((signal - low) ** 2, (signal - high) ** 2).sum()
     values = np.sort(signal)
     cuts = (
@@ -96,6 +97,14 @@ def test_a_split_fills_the_face_and_never_stretches_windows(rule, size):
     assert done.windows == sum(source % 2 for source in done.sources)
     assert done.sources[0] % 2 == 0
     assert done.sources[-1] % 2 == 0
+
+
+@given(rules, st.floats(0.5, 60), st.floats(0.5, 60))
+def test_the_rule_of_a_split_is_a_rule(rule, size, other):
+    own = split_rule(rule, size)
+    assert own.size == pytest.approx(size)
+    assert len(own.scalable) == len(own.insertable) + 1
+    assert math.fsum(split(own, other).sizes) == pytest.approx(other)
 
 
 def test_equation_8_and_9_by_hand():

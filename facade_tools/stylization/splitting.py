@@ -152,7 +152,14 @@ def split(rule: SplitRule, size: float) -> Split:
 def split_rule(rule: SplitRule, size: float) -> SplitRule:
     """Return the rule of a face after the split: what a second split starts from."""
     done = split(rule, size)
-    return SplitRule(done.sizes[::2], done.sizes[1::2])
+    walls, windows = [0.0], []
+    for source, width in zip(done.sources, done.sizes, strict=True):
+        if source % 2:
+            windows.append(width)
+            walls.append(0.0)
+        else:  # where a repeat ends and the next begins, two walls are one
+            walls[-1] += width
+    return SplitRule(tuple(walls), tuple(windows))
 
 
 def _count(rule: SplitRule, size: float) -> int:

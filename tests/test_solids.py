@@ -151,8 +151,10 @@ def test_roofs_on_random_plans_close(kind: str, style: str) -> None:
 def test_slivers_and_pinched_loops_leave_no_hole() -> None:
     """A piece without width is a face of its own; a loop that comes back to a vertex is cut."""
     vertices = np.array(
-        [(0, 0, 1), (4, 0, 1), (4, 4, 1), (0, 4, 1)]
-        + [(6, 1, 1), (6.001, 1, 1), (6.0005, 0.9999, 1)],  # clockwise, without area
+        [
+            *[(0, 0, 1), (4, 0, 1), (4, 4, 1), (0, 4, 1)],
+            *[(6, 1, 1), (6.001, 1, 1), (6.0005, 0.9999, 1)],  # clockwise, without area
+        ],
         dtype=np.float64,
     )
     pieces = [

@@ -19,6 +19,7 @@ NEAR = 0.3  # metres between balconies that are one
 STEEP = 0.6  # share of a window's width that a balcony below it must cover to stand before it
 LOWEST_LOFT = 0.8  # metres of roof in a picture that are worth a slope
 MOST_STOREY = (2.0, 6.0)  # metres
+LARGEST = 300.0  # metres, of a facade
 DOOR = 0.6  # metres above the ground from which a door is none
 
 
@@ -93,6 +94,9 @@ def elevation(
     low = [rect for rect in rects if (rect.v0 + rect.v1) / 2 < wall]
     high = [rect for rect in rects if (rect.v0 + rect.v1) / 2 >= wall]
     width = labels.shape[1] * scale
+    if max(width, wall) > LARGEST:
+        message = f"the facade is {width:.0f} m wide and {wall:.0f} m high; at most {LARGEST:g} m"
+        raise InvalidInput(message, pointer="/floors")
     frame = Rect("", 0.0, 0.0, width, wall)
     balconies = _joined([_cut(r, frame) for r in low if r.label == "balcony"])
     return Elevation(

@@ -1,7 +1,7 @@
 """How long `layer-solve` takes, and how far it agrees with the brute force of the tests.
 
-Usage: python benchmarks/bench_layer_solve.py [--hard] [--oracle N [--first SEED]]; without either, the
-sample designs. Seconds are of CPU time.
+Usage: python benchmarks/bench_layer_solve.py [--hard] [--oracle N [--first SEED]]; without
+either, the sample designs. Seconds are of CPU time.
 """
 
 from __future__ import annotations

@@ -62,7 +62,8 @@ class Generator:
         self.limit = self.canvas + self.tolerance + self.slack
         self.least = direction.least_sizes()
         self.complete = True
-        self._rows: dict[tuple[int, tuple[int, ...]], Family] = {}
+        self.used = [sorted(counters_of(row.node)) for row in self.rows]
+        self._rows: dict[tuple[int, str, tuple[int, ...]], Family] = {}
 
     def candidates(self) -> Iterator[Candidate]:
         """Yield candidates, each tuple of words once, small counters first."""
@@ -78,7 +79,7 @@ class Generator:
 
     def sampled(self, rng: np.random.Generator) -> Iterator[Candidate]:
         """Yield candidates with random counters and words; the same one may come again."""
-        names = sorted(set[str]().union(*(counters_of(row.node) for row in self.rows)))
+        names = sorted(set[str]().union(*self.used))
         while not self.late():
             ranges = {name: self.direction.counters[name] for name in names}
             for name in rng.permutation(names):
@@ -117,7 +118,7 @@ class Generator:
 
     def assignments(self) -> Iterator[dict[str, int]]:
         """Yield values of the group's counters under which every layer may have a fitting word."""
-        names = sorted(set[str]().union(*(counters_of(row.node) for row in self.rows)))
+        names = sorted(set[str]().union(*self.used))
         yield from self._assign(names, {name: self.direction.counters[name] for name in names})
 
     def _assign(
@@ -145,13 +146,13 @@ class Generator:
 
     def _possible(self, ranges: Ranges) -> bool:
         how = Expansion({}, self.least, self.limit)
-        return all(least_size(row.node, how, ranges) <= self.limit for row in self.rows)
+        nodes = {id(row.node): row.node for row in self.rows}.values()
+        return all(least_size(node, how, ranges) <= self.limit for node in nodes)
 
     def rows_of(self, layer: int, counters: Mapping[str, int]) -> Family:
         """Return the words of a layer that are not too wide, or lattices of them."""
         row = self.rows[layer]
-        used = tuple(counters[name] for name in sorted(counters_of(row.node)))
-        key = (layer, used)
+        key = (id(row.node), row.reflection, tuple(counters[name] for name in self.used[layer]))
         if key not in self._rows:
             self._rows[key] = self._expanded(row, counters)
         found = self._rows[key]

@@ -88,39 +88,43 @@ class GroupSearch:
 
         What the clock cuts off is answered by a beam search, and is not optimal.
         """
-        proved = cleared = True
         first = self.clock
         self.clock = first.share(PROVING)
+        open_: list[Stage] = []  # not searched to their ends
         for stage in STAGES:
             found = self.at(stage)
-            proved = proved and found.complete
+            open_ += [] if found.complete else [stage]
             if found.alignment is not None:
                 self.clock = first
-                if not found.complete and not first.over(1.0):
-                    found = self._again(stage, found)
-                    proved = found.complete and cleared
-                return self._finished(found, proved)
-            cleared = proved
+                best, proved = self._closed(found.alignment, open_)
+                return self._answered(best or found.alignment, proved)
             if self.clock.over():
-                break
-        else:
-            self.clock = first
-            self.exhausted = proved
-            return None if proved else self._rescued(STAGES[0])
+                self.clock = first
+                return self._rescued(stage)
+        self.clock = first.share(0.5)
+        best, self.exhausted = self._closed(None, open_)
         self.clock = first
-        return self._rescued(stage)
+        if best is not None:
+            return self._answered(best, self.exhausted)
+        return None if self.exhausted else self._rescued(open_[0])
 
-    def _again(self, stage: Stage, before: Found) -> Found:
-        """Search a stage with the time that is left; keep what was known if it is better."""
-        found = self.at(stage)
-        if found.alignment is None or before.alignment is None:
-            return replace(before, complete=False)
-        better = self._before(before.alignment, found.alignment)
-        return replace(before, complete=False) if better else found
+    def _closed(self, best: Alignment | None, stages: list[Stage]) -> tuple[Alignment | None, bool]:
+        """Search stages again with the time that is left; return the best, and if that is proved.
 
-    def _finished(self, found: Found, proved: bool) -> Answer | None:
-        assert found.alignment is not None
-        return self._answered(found.alignment, proved)
+        best: what is known, of a stage that is not before those.
+        """
+        for stage in stages:
+            if self.clock.over(1.0):
+                return best, False
+            found = self.at(stage)
+            one = found.alignment
+            if one is not None and (best is None or not self._before(best, one)):
+                best = one
+            if not found.complete:
+                return best, False
+            if one is not None:
+                break
+        return best, True
 
     def _answered(self, best: Alignment, proved: bool) -> Answer:
         """Return an answer with the gap between its Ω and the least that may have been missed."""

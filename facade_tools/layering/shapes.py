@@ -129,25 +129,27 @@ def _mask(stack: Stack, layer: DesignLayer, axis: str) -> set[str]:
 
 def _uncovered(stack: Stack, shapes: list[LayoutShape]) -> tuple[LayoutShape, ...]:
     """Hide shapes that lie wholly behind opaque boxes of the layers above them."""
-    xs, ys = _places(shapes, "x0", "x1"), _places(shapes, "y0", "y1")
-    covered = np.zeros((len(ys), len(xs)), dtype=bool)
+    x0, x1, width = _ranks(shapes, "x0", "x1")
+    y0, y1, height = _ranks(shapes, "y0", "y1")
+    covered = np.zeros((height, width), dtype=bool)
     out = []
-    for shape in shapes:
-        x0, x1 = xs[round(shape.x0, 9)], xs[round(shape.x1, 9)]
-        y0, y1 = ys[round(shape.y0, 9)], ys[round(shape.y1, 9)]
-        cells = covered[y0:y1, x0:x1]
-        if shape.visible and cells.all():
-            shape = replace(shape, visible=False)
-        elif shape.visible and _covers(stack, shape):
-            cells[:] = True
+    for i, shape in enumerate(shapes):
+        if shape.visible:
+            cells = covered[y0[i] : y1[i], x0[i] : x1[i]]
+            if cells.all():
+                shape = replace(shape, visible=False)
+            elif _covers(stack, shape):
+                cells[:] = True
         out.append(shape)
     return tuple(out)
 
 
-def _places(shapes: Sequence[LayoutShape], low: str, high: str) -> dict[float, int]:
-    """Return the rank of every border."""
-    values = {round(getattr(shape, end), 9) for shape in shapes for end in (low, high)}
-    return {value: rank for rank, value in enumerate(sorted(values))}
+def _ranks(shapes: Sequence[LayoutShape], low: str, high: str) -> tuple[list[int], list[int], int]:
+    """Return the ranks of every shape's lower and upper border, and how many there are."""
+    ends = [[getattr(shape, end) for shape in shapes] for end in (low, high)]
+    values, ranks = np.unique(np.round(ends, 9), return_inverse=True)
+    first, second = ranks.reshape(2, -1).tolist()
+    return first, second, len(values)
 
 
 def _covers(stack: Stack, shape: LayoutShape) -> bool:

@@ -99,7 +99,8 @@ def test_draws_depend_on_the_generator_alone():
 @pytest.mark.parametrize(
     "text",
     ["__import__('os')", "w.real", "[1]", "lambda: 1", "w ** 9", "f'{w}'", "1 +", "unknown", "1/0",
-     "'a' * 3", "open(1)", "-" * 80 + "1", "1e999", "'a' < 1"],
+     "'a' * 3", "open(1)", "-" * 80 + "1", "1e999", "'a' < 1",
+     "uniform(1)", "sqrt(-1)", "floor(1e308 * 10)", "min('a', 1)", "choice(1)(2)", "w if"],
 )  # fmt: skip
 def test_what_is_no_expression_is_refused(text):
     with pytest.raises(InvalidInput):

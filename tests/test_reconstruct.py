@@ -84,6 +84,13 @@ def test_the_elevation_is_in_metres():
     assert elevation(parsed(), height=7.5).loft == pytest.approx(1.5)
 
 
+def test_a_sliver_of_roof_is_no_loft():
+    rows = tuple(r for r in regions(windows=False) if r.label != "roof")
+    low = (*rows, Region("roof", 0, 45, WIDTH, 50), Region("sky", 0, 20, WIDTH, 45))
+    plan = elevation(parsed(regions=low))
+    assert (plan.loft, plan.pixels[1]) == (0.0, 50)
+
+
 def test_windows_reach_down_to_the_balcony_before_them():
     plan = elevation(parsed())
     french = [r for r in plan.openings if r.label == "window" and 6.0 <= r.v0 < 6.5]

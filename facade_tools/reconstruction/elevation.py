@@ -107,7 +107,7 @@ def elevation(
         tuple(r for r in balconies if _large(r)),
         tuple(_dormers(high, wall, loft)) if loft >= LOWEST_LOFT else (),
         tuple(_chimneys(high, wall + loft)),
-        (0, top, labels.shape[1], ground),
+        (0, top if loft >= LOWEST_LOFT else eaves, labels.shape[1], ground),
     )  # fmt: skip
 
 

@@ -114,7 +114,7 @@ def _operands(node: ast.expr) -> list[ast.expr]:
 
 def _value(node: ast.expr, names: Names, rng: np.random.Generator) -> Value:
     if isinstance(node, ast.Constant):
-        return node.value  # type: ignore[return-value]
+        return node.value if isinstance(node.value, str) else float(node.value)  # type: ignore[arg-type]
     if isinstance(node, ast.Name):
         if node.id not in names:
             known = ", ".join(sorted(names))

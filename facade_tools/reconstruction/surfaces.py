@@ -74,10 +74,7 @@ def canvas_of(photo: Picture, labels: Labels, plan: Elevation) -> Canvas:
     size = (max(1, round(part.shape[1] * factor)), max(1, round(part.shape[0] * factor)))
     picture = np.asarray(cv2.resize(part, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
     index = np.asarray(cv2.resize(own, size, interpolation=cv2.INTER_NEAREST), dtype=np.uint8)
-    total = plan.eaves + plan.loft
-    shown = plan.loft or (y1 - y0) * 0.0
-    scale = (size[0] / plan.width, size[1] / (plan.eaves + shown) if total else 1.0)
-    return Canvas(picture, index, scale)
+    return Canvas(picture, index, (size[0] / plan.width, size[1] / (plan.eaves + plan.loft)))
 
 
 def surfaces_of(
@@ -88,7 +85,7 @@ def surfaces_of(
     axes, strips = _axes(clean, plan)
     pictures = {PHOTO: canvas.picture, FRONT: clean.picture}
     if strips:
-        pictures[SIDE] = joined(strips, _margin(clean, plan, axes[0].width))
+        pictures[SIDE] = joined(strips, _margin(clean, axes[0].width))
     for name, label in ((WALL, "wall"), (ROOF, "roof")):
         exemplars = list(_exemplars(clean, LABELS.index(label)))
         if exemplars:
@@ -183,14 +180,13 @@ def _openings(plan: Elevation, centre: float, width: float) -> Iterator[Rect]:
             yield Rect("window", u0, max(v0, 0.0), u1, min(v1, ground))
 
 
-def _margin(canvas: Canvas, plan: Elevation, width: float) -> int:
-    del plan
+def _margin(canvas: Canvas, width: float) -> int:
     return max(1, round(SEAM * width * canvas.scale[0]))
 
 
 def _strip(canvas: Canvas, plan: Elevation, centre: float, width: float) -> Picture:
     """Return an axis from ground to eaves with margins; the ground floor is the storey above."""
-    margin = _margin(canvas, plan, width)
+    margin = _margin(canvas, width)
     pixels = max(4 * margin + 1, round(width * canvas.scale[0]) + 2 * margin)
     left = min(max(round(centre * canvas.scale[0]) - pixels // 2, 0),
                canvas.picture.shape[1] - pixels)  # fmt: skip

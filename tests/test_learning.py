@@ -20,7 +20,7 @@ from facade_tools.exteriors.groups import BitGroup, Coordinate
 from facade_tools.exteriors.holdout import compare_variants, splits, training_curve
 from facade_tools.exteriors.layout import GroupLayout, Layout, building_layout
 from facade_tools.exteriors.learning import LearnOptions, learn_model, learn_readings
-from facade_tools.exteriors.network import Family, Network, infer
+from facade_tools.exteriors.network import Family, Network, Pooled, infer
 from facade_tools.exteriors.prior import shipped_prior
 from facade_tools.exteriors.score import cheeseman_stutz, log_marginal, table_part
 from facade_tools.exteriors.serialisation import network_of
@@ -52,7 +52,8 @@ def start(data, layout, scalings, size):
     return Network(layout, scalings, upper.style, upper.bits, families)
 
 
-def test_em_never_lowers_the_objective_with_nulls(houses):
+@pytest.mark.parametrize("lateral", [False, True])
+def test_em_never_lowers_the_objective_with_nulls(houses, lateral):
     rng = np.random.default_rng(0)
     layout = building_layout()
     readings = read_attributes(houses[::3], layout)
@@ -60,7 +61,14 @@ def test_em_never_lowers_the_objective_with_nulls(houses):
     readings = Readings(readings.ids, values, readings.parts, readings.bits)
     scalings = fit_scaling(readings, layout)
     data = build(readings, layout, scalings)
-    fit = run(start(data, layout, scalings, 3), data, Prior(), stop=Stop(1e-12, None, 40))
+    network = start(data, layout, scalings, 3)
+    if lateral:  # wwr under bbox, its prior around the regression of all rows
+        task = mixture.Task(data, 7, layout.groups[7], scalings[7], np.ones(len(data)), Prior())
+        families = list(network.families)
+        families[7] = mixture.reshaped(task, families[7], (0, 1, 2))
+        assert np.count_nonzero(families[7].pooled.coef[:, 1:])
+        network = replace(network, families=tuple(families))
+    fit = run(network, data, Prior(), stop=Stop(1e-12, None, 40))
     assert len(fit.trace) > 10
     assert np.diff(fit.trace).min() > -1e-7 * abs(fit.trace[-1])
 
@@ -100,24 +108,28 @@ def test_table_part_is_the_dirichlet_marginal_over_sequences():
     assert found == pytest.approx(total - counts @ np.log(p))
 
 
-def test_gaussian_marginal_is_the_chain_of_predictives():
+@pytest.mark.parametrize("centred", [False, True])
+def test_gaussian_marginal_is_the_chain_of_predictives(centred):
     """The marginal of n rows is the product of Student predictives, one row at a time."""
     rng = np.random.default_rng(2)
+    pooled = Pooled(rng.normal(size=(2, 2)), np.array([0.3, 0.8])) if centred else None
     d, q, n, prior = 2, 1, 5, Prior()
     x, u = rng.normal(size=(n, d)), np.column_stack([np.ones(n), rng.normal(size=(n, q))])
 
     def marginal(rows):
         a, b = x[:rows], u[:rows]
         stats = Statistics((b.T @ b)[None], (a.T @ b)[None], (a.T @ a)[None], (), np.ones((1, 1)))
-        return log_marginal(stats, prior)[0]
+        return log_marginal(stats, prior, pooled)[0]
 
     precision = np.diag(em.prior_precision(1 + q, prior))
+    mean = em.prior_mean(d, 1 + q, pooled)
     total = 0.0
     for i in range(n):
         a, b = x[:i], u[:i]
         after = b.T @ b + precision
-        coef = np.linalg.solve(after, b.T @ a).T
-        scatter = em.wishart_scale(d, prior) + a.T @ a - coef @ after @ coef.T
+        coef = np.linalg.solve(after, b.T @ a + precision @ mean.T).T
+        scatter = em.wishart_scale(d, prior, pooled) + a.T @ a - coef @ after @ coef.T
+        scatter = scatter + mean @ precision @ mean.T
         freedom = d + prior.freedom + i - d + 1
         factor = 1 + u[i] @ np.linalg.solve(after, u[i])
         shape = scatter * factor / freedom

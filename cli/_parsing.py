@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
+import click
 import numpy as np
 from numpy.typing import NDArray
 
@@ -149,6 +150,7 @@ def _straight(
 
 def run_parse(stream: StreamOptions, options: ParseOptions) -> None:
     """Read all pictures; write parses to the output and pictures beside."""
+    _refuse_foreign(options)
     method = _method(options.method, _read_options(options))  # its errors come before any picture
     del method
     sources = (
@@ -179,6 +181,17 @@ def run_parse(stream: StreamOptions, options: ParseOptions) -> None:
         progress.close()
     if bad:
         raise InvalidInput(f"{bad} bad items were skipped")
+
+
+FOREIGN = {"forest": ("height", "storey_height"), "mrf": ("classifier", "grammar")}
+
+
+def _refuse_foreign(options: ParseOptions) -> None:
+    """Raise UsageError where an option of another method is given."""
+    for name in FOREIGN[options.method]:
+        if getattr(options, name) is not None:
+            flag = name.replace("_", "-")
+            raise click.UsageError(f"--{flag} means nothing to --method {options.method}")
 
 
 def _grammar_source(options: ParseOptions) -> tuple[Source, ...]:

@@ -213,3 +213,12 @@ def test_the_command_writes_a_parse_and_its_pictures(tmp_path, facade_here):
     assert document["tags"]["scale"] == "storey-height"
     assert document["provenance"]["options"]["storey_height"] == 3.2
     assert (tmp_path / "overlay.png").stat().st_size > 0
+
+
+@pytest.mark.parametrize("options", [
+    ("--method", "mrf", "--grammar", "plain"), ("--method", "forest", "--height", "12"),
+])  # fmt: skip
+def test_options_of_another_method_are_refused(options, facade_here):
+    done = facade_here("parse-image", "front.png", *options)
+    assert done.returncode == 2
+    assert b"means nothing" in done.stderr

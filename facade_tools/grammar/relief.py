@@ -49,7 +49,10 @@ def parse_scene(parse: Parse) -> Scene:
 
 
 def metres_per_pixel(parse: Parse) -> float:
-    """Return the scale at which floors stand 3 m apart (median)."""
+    """Return the scale that the parse's tags say, else that at which floors stand 3 m apart."""
+    said = parse.tags.get("metres_per_pixel")
+    if isinstance(said, int | float) and said > 0:
+        return float(said)
     feet = sorted({floor.y1 for floor in parse.floors})
     gaps = np.diff(feet)
     if len(gaps) == 0 or np.median(gaps) <= 0:

@@ -57,7 +57,7 @@ def read_facade(
     Raises Infeasible where the picture is too small for a floor of windows.
     """
     del rng
-    facade, cell = in_cells(photo, scale, mask)
+    facade = in_cells(photo, scale, mask)
     bands, energy = storeys(facade)
     chain = stripes(facade)
     columns = spans(chain, bands, facade.plane)
@@ -79,17 +79,15 @@ def read_facade(
         bound=energy + chain.energy,
         optimal=True,
         derivation=tree,
-        tags=_tags(scale, cell, facade, shape),
+        tags=_tags(scale, facade, shape),
     )
     return Reading(parse, painted(tree, shape, label_index()), _raw(facade, shape))
 
 
-def in_cells(
-    photo: Photo, scale: Scale, mask: NDArray[np.bool_] | None = None
-) -> tuple[Facade, float]:
-    """Return a picture in cells of 10 cm, and the working pixels of a cell.
+def in_cells(photo: Photo, scale: Scale, mask: NDArray[np.bool_] | None = None) -> Facade:
+    """Return a picture in cells of 10 cm. Without a scale a storey is taken to be 3 m high.
 
-    Without a scale a storey is taken to be 3 m high.
+    Raises Infeasible where it has too few cells for a floor and a window.
     """
     working = fitted(photo.pixels, ROWS, PIXELS)
     evidence = window_evidence(working, _shrunk(mask, working.shape[:2]))
@@ -115,7 +113,7 @@ def _facade(
     colour: NDArray[np.float64],
     sky: int,
     cell: float,
-) -> tuple[Facade, float]:
+) -> Facade:
     height, width = working.shape[:2]
     cell = max(cell, height / MOST, width / MOST)
     n, m = round(height / cell), round(width / cell)
@@ -123,7 +121,7 @@ def _facade(
     picture = cv2.resize(working, (m, n), interpolation=cv2.INTER_AREA).astype(np.float64) / 255
     plane = cv2.resize(evidence.plane, (m, n), interpolation=cv2.INTER_AREA).astype(np.float32)
     lines = np.interp(np.arange(n + 1) * height / n, np.arange(height + 1), colour)
-    return Facade(picture, plane, lines, round(sky * n / height)), cell
+    return Facade(picture, plane, lines, round(sky * n / height))
 
 
 def _shrunk(mask: NDArray[np.bool_] | None, shape: tuple[int, ...]) -> NDArray[np.bool_] | None:
@@ -229,9 +227,8 @@ def _borders(facade: Facade, columns: list[Span], shape: tuple[int, ...]) -> tup
     return tuple(round(x * at.x) for x in sorted(edges))
 
 
-def _tags(scale: Scale, cell: float, facade: Facade, shape: tuple[int, ...]) -> dict[str, object]:
+def _tags(scale: Scale, facade: Facade, shape: tuple[int, ...]) -> dict[str, object]:
     """Return the metres of a pixel, and where they come from."""
-    del cell
     known = "height" if scale.height else "storey-height" if scale.storey else "relative"
     return {
         "scale": known,

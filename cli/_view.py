@@ -93,10 +93,24 @@ def run_view(stream: StreamOptions, options: ViewOptions) -> None:
     ending = Path(output).suffix.lower()
     if ending in (".html", ".htm"):
         _emit(output, _page(stream, Path(output).stem))
+    elif ending == ".svg":
+        _emit(output, _vectors(stream))
     elif ending == ".png" or output == "-":
         _emit(output, write_png(_sheet(stream, options)))
     else:
-        raise click.UsageError(f"{output}: unknown ending; expected .png or .html.")
+        raise click.UsageError(f"{output}: unknown ending; expected .png, .html or .svg (layouts).")
+
+
+def _vectors(stream: StreamOptions) -> bytes:
+    """Return the drawing of one layout, or of several on one sheet, as SVG."""
+    from facade_tools.layering.drawing import sheet_bytes
+
+    layouts = []
+    for item in islice(read_raw(stream.inputs), MOST_PICTURES + 1):
+        layouts.append(item.artifact("layout"))
+    if not 0 < len(layouts) <= MOST_PICTURES:
+        raise InvalidInput(f"expected 1 to {MOST_PICTURES} layouts for a .svg drawing")
+    return sheet_bytes(layouts, ".svg")
 
 
 def _emit(output: str, data: bytes) -> None:

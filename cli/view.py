@@ -62,7 +62,7 @@ def command(stream: StreamOptions, **values: object) -> None:
     """Draw any artifact: a picture (.png) or a page that turns in a browser (.html).
 
     Several artifacts make a contact sheet, or a page with a list to pick from. Pages need no
-    network.
+    network. Layouts are drawn as vectors, too (.svg).
 
     \b
     Example: facade view buildings.jsonl -o sheet.png --columns 6

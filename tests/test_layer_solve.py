@@ -154,6 +154,9 @@ def test_command(facade, tmp_path):
     assert layout["provenance"]["inputs"][0]["name"] == "residential-9.yaml"
     assert layout["assets"]["column.obj"]["media"] == "model/obj"
     assert (tmp_path / "sheet.png").read_bytes()[:4] == b"\x89PNG"
+    done = facade("view", out, "-o", tmp_path / "drawing.svg")
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "drawing.svg").read_bytes().startswith(b"<svg")
     done = facade("export", out, "-o", tmp_path / "model.glb")
     assert done.returncode == 0, done.stderr
     sweep = facade("layer-solve", RESIDENTIAL, "--width", "6:8:2")

@@ -111,12 +111,17 @@ def _material(name: str, shape: LayoutShape, layout: Layout) -> Material:
     color, _, texture = name.partition(" ")
     entry = layout.assets.get(texture)
     if not texture or entry is None:
-        return Material(name.replace(" ", "-"), color)
+        return Material(_plain(name), color)
     try:
         picture = base64.b64decode(entry["data"], validate=True)
     except binascii.Error:
         raise InvalidInput("is no base64", pointer=f"/assets/{texture}/data") from None
-    return Material(name.replace(" ", "-"), "#ffffff", texture=picture)
+    return Material(_plain(name), "#ffffff", texture=picture)
+
+
+def _plain(name: str) -> str:
+    """Return a material's name without blanks and #, which some readers take for a comment."""
+    return name.replace(" ", "-").replace("#", "color-")
 
 
 def _merged(name: str, material: str, patches: list[Patch]) -> Mesh:

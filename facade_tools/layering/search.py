@@ -81,6 +81,8 @@ class GroupSearch:
         self.aligner = Aligner(direction, lambda ahead: self.clock.over(ahead), clock.now)
         self.exhausted = False  # whether everything has been tried that may have a layout
         self._kept: dict[float, tuple[list[Candidate], Generator]] = {}
+        self._alive: list[list[Candidate]] = []  # so that no two candidates have one identity
+        self._refuted: dict[tuple[Stage, int], float] = {}  # no smaller Ω than this
         self._floors: dict[Stage, float] = {}  # of Ω, where a stage is not searched to its end
 
     def answer(self) -> Answer | None:
@@ -214,6 +216,7 @@ class GroupSearch:
             return
         generator = Generator(self.direction, self.groups, tolerance, self.clock.over, self.few)
         kept: list[Candidate] = []
+        self._alive.append(kept)
         for candidate in generator.candidates():
             kept.append(candidate)
             yield candidate
@@ -245,8 +248,12 @@ class GroupSearch:
             limit = budget if best is None else best.omega
             if not self._hopeful(candidate, stage, limit):
                 continue
+            if self._refuted.get((stage, id(candidate)), -1.0) >= limit:
+                continue
             found = self._align(candidate, stage, limit, self.effort)
             complete = complete and found.complete
+            if found.complete and found.alignment is None:
+                self._refuted[stage, id(candidate)] = limit
             if found.alignment is not None and (
                 best is None or self._before(found.alignment, best)
             ):

@@ -136,9 +136,10 @@ def test_regions_always_tile(height, width, seed):
         assert_tiles(read(pixels).parse)
 
 
-def test_a_picture_too_small_is_refused():
+@pytest.mark.parametrize("shape", [(1, 1), (5, 3), (900, 20), (20, 4000)])
+def test_a_picture_too_small_is_refused(shape):
     with pytest.raises(Infeasible, match="too small"):
-        read(np.zeros((5, 3, 3), np.uint8), Scale(height=2.0))
+        read(np.zeros((*shape, 3), np.uint8), Scale(height=2.0))
 
 
 def test_profiles_are_those_of_a_product():
@@ -151,6 +152,15 @@ def test_profiles_are_those_of_a_product():
     assert np.allclose(rows[down == 0], 0)
     assert columns[across > 0].min() > columns[across == 0].max()
     assert (agreement(plane, columns, 1.0)[down > 0] > 0.4).all()
+
+
+def test_the_profiles_of_a_wide_and_a_high_plane_are_found_alike():
+    plane = np.random.default_rng(2).normal(size=(30, 50)).astype(np.float32)
+    plane += 3 * np.outer(np.hanning(30), np.cos(np.arange(50)))
+    for part in (plane, plane[:, :20]):
+        rows, columns = profiles(part)
+        assert np.linalg.norm(columns) == pytest.approx(1)
+        assert rows[15] > 0.5
 
 
 def test_the_rim_of_a_rectified_picture_says_nothing():

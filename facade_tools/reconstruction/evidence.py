@@ -143,6 +143,9 @@ def _lengths(table: NDArray[np.float64], axis: int, floor: float) -> NDArray[np.
 
 def _leading(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the leading right singular vector, turned to agree with most rows."""
-    values, vectors = np.linalg.eigh(rows.T @ rows)
-    across: NDArray[np.float64] = vectors[:, int(np.argmax(values))]
+    wide = rows.shape[1] > rows.shape[0]  # the smaller of the two products is enough
+    values, vectors = np.linalg.eigh(rows @ rows.T if wide else rows.T @ rows)
+    leading = vectors[:, int(np.argmax(values))]
+    across: NDArray[np.float64] = rows.T @ leading if wide else leading
+    across = across / (np.linalg.norm(across) + 1e-12)
     return across if (rows @ across).sum() >= 0 else -across

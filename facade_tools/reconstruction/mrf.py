@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..artifacts.grammar import Node
 from ..artifacts.parse import LABELS, Floor, ImageInfo, Parse, Region
+from ..errors import Infeasible
 from ..grammar.derivation import leaves, painted
 from ..grammar.reading import Method, Reading, ReadOptions, label_index
 from ..imaging.image_io import Photo, fitted
@@ -26,6 +27,7 @@ from .stripes import Span, roof_spans, spans, stripes
 
 ROWS, PIXELS = 320, 160_000  # the working picture
 MOST = 1500  # cells a side
+LEAST_SIDE = 24  # pixels of the working picture
 REACH = 0.12  # share of the height on either side of a line whose colours are compared
 IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -87,9 +89,11 @@ def read_facade(
 def in_cells(photo: Photo, scale: Scale, mask: NDArray[np.bool_] | None = None) -> Facade:
     """Return a picture in cells of 10 cm. Without a scale a storey is taken to be 3 m high.
 
-    Raises Infeasible where it has too few cells for a floor and a window.
+    Raises Infeasible where it has too few pixels or cells for a floor and a window.
     """
     working = fitted(photo.pixels, ROWS, PIXELS)
+    if min(working.shape[:2]) < LEAST_SIDE:
+        raise Infeasible(f"the picture is too small; expected at least {LEAST_SIDE} pixels a side")
     evidence = window_evidence(working, _shrunk(mask, working.shape[:2]))
     height = len(working)
     found, reach = segments(working, evidence.seen), max(2, int(REACH * height))

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+import shapely
 
 from ..artifacts.shape_grammar import Terminal
 from ..errors import InvalidInput
@@ -18,11 +19,12 @@ from ..geometry.details import PALETTE, mass_mesh, materials
 from ..geometry.mesh import Material, Mesh, Scene
 from ..geometry.openings import Opening, pierced
 from ..geometry.patterns import pattern_uv
+from ..geometry.polygons import shape_of
 from ..geometry.solids import Solid
 from .engine import Derived, Leaf
 from .scopes import FLAT, UP, Shape
 from .skins import Skins, unit_normal
-from .volumes import mass_solid, standing
+from .volumes import inside_mass, mass_solid, standing
 
 OPEN = ("window", "door", "garage-door")
 COLORS = {
@@ -32,6 +34,7 @@ COLORS = {
 }  # fmt: skip
 SLAB = 0.14  # metres, thickness of a balcony
 WALL = 0.1  # of its parapet
+PROBE = 0.02  # metres before a face where it is looked whether something hides it
 BAR, GAP, RAIL = 0.02, 0.13, 0.05  # metres: bars of a railing, their distance, its hand rail
 
 Painted = tuple[str, Points2 | None]
@@ -58,6 +61,7 @@ def derived_scene(derived: Derived, name: str, look: Look | None = None) -> Scen
     """
     look = look or Look()
     solid = mass_of(derived)
+    derived = replace(derived, leaves=_shown(derived))
     openings = [opening for opening in map(opening_of, derived.leaves) if opening is not None]
     held = [opening for opening in openings if _on_wall(solid, opening)]
     recessed, closes = pierced(solid, held)
@@ -74,6 +78,29 @@ def derived_scene(derived: Derived, name: str, look: Look | None = None) -> Scen
                 for mesh in _inserted(opening, opening.frame)]  # fmt: skip
     meshes = [mass_mesh(recessed), *skins.meshes(), *details]
     return Scene(name, tuple(meshes), _materials(derived, look, meshes))
+
+
+def _shown(derived: Derived) -> tuple[Leaf, ...]:
+    """Return the leaves without the flat ones that another volume hides."""
+    flat = [leaf for leaf in derived.leaves if leaf.shape.thickness <= FLAT]
+    probes = [_probes(leaf) for leaf in flat]
+    if not probes:
+        return derived.leaves
+    inside = inside_mass(np.concatenate(probes), standing(derived.volumes))
+    ends = np.cumsum([len(points) for points in probes])[:-1]
+    hidden = {
+        leaf.name for leaf, rows in zip(flat, np.split(inside, ends), strict=True) if rows.all()
+    }
+    return tuple(leaf for leaf in derived.leaves if leaf.name not in hidden)
+
+
+def _probes(leaf: Leaf) -> Points3:
+    """Return points (n, 3) just before a flat leaf: near its corners, and in their middle."""
+    ring = leaf.faces.points[list(leaf.faces.faces[0][0])]
+    normal = unit_normal(ring)
+    middle = ring.mean(axis=0)
+    before = np.zeros(3) if normal is None else PROBE * normal
+    return np.asarray(np.vstack([middle + 0.98 * (ring - middle), middle]) + before)
 
 
 def mass_of(derived: Derived) -> Solid:
@@ -157,9 +184,10 @@ def _on_wall(solid: Solid, opening: Opening) -> bool:
     for face, label in zip(solid.faces, solid.labels, strict=True):
         if label.semantic != "wall":
             continue
-        local = (solid.vertices[list(face[0])] - middle) @ opening.frame.axes.T
-        around = (local[:, :2].min(axis=0) < 0.0).all() and (local[:, :2].max(axis=0) > 0.0).all()
-        if around and np.abs(local[:, 2]).max() < 1e-5:
+        rings = [(solid.vertices[list(ring)] - middle) @ opening.frame.axes.T for ring in face]
+        if np.abs(rings[0][:, 2]).max() < 1e-5 and shapely.intersects_xy(
+            shape_of([ring[:, :2] for ring in rings]), 0.0, 0.0
+        ):
             return True
     return False
 

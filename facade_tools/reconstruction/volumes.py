@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import shapely
 
-from ..geometry.arrays import Points2
+from ..geometry.arrays import Booleans, Points2, Points3
 from ..geometry.polygons import Rings, oriented, shape_of, signed_area
 from ..geometry.roofs import Patch
 from ..geometry.solids import Solid
@@ -92,6 +92,16 @@ def _rests(volume: Volume, others: Sequence[Volume]) -> bool:
             inside = shapely.intersects_xy(shape_of(patch.rings), probes[:, 0], probes[:, 1])
             heights[inside] = np.maximum(heights[inside], _height(patch, probes[inside]))
     return bool((heights >= volume.bottom - REST).all())
+
+
+def inside_mass(points: Points3, volumes: Sequence[Volume]) -> Booleans:
+    """Return whether points (n, 3) lie inside standing volumes."""
+    inside = np.zeros(len(points), dtype=bool)
+    for volume in volumes:
+        for patch in volume.patches:
+            over = shapely.intersects_xy(shape_of(patch.rings), points[:, 0], points[:, 1])
+            inside |= over & (points[:, 2] < _height(patch, points[:, :2]) - GROUND)
+    return inside
 
 
 def mass_solid(volumes: Sequence[Volume]) -> Solid | None:

@@ -7,14 +7,17 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from unittest.mock import patch
 
 import numpy as np
 
 from facade_tools.artifacts.attributes import Attributes, MassAttributes
+from facade_tools.exteriors import physical
 from facade_tools.exteriors.density import log_density
 from facade_tools.exteriors.drawing import SampleOptions, sample_attributes
 from facade_tools.exteriors.learning import LearnOptions, learn_model
 from facade_tools.exteriors.prior import shipped_prior
+from facade_tools.exteriors.sample_lines import sample_lines
 from facade_tools.exteriors.sampling import BLOCK, draw_block
 from facade_tools.exteriors.serialisation import network_of
 
@@ -79,18 +82,26 @@ def main() -> None:
     block = draw_block(network, rng=rng).readings
     log_density(network, block)
     print(f"with log density: {BLOCK / (time.process_time() - start):,.0f}/s")
-    for name, options in (("artifacts", QUICK), ("artifacts with neighbours", SampleOptions())):
+    for name, options in (("lines of JSON", SampleOptions()), ("lines without neighbours", QUICK)):
         start = time.process_time()
-        drawn = list(sample_attributes(models["full"], 4000, rng=rng, options=options))
-        print(f"{name}: {4000 / (time.process_time() - start):,.0f}/s")
+        for _ in sample_lines(
+            models["full"], 8192, rng=rng, given=None, options=options, provenance=None
+        ):
+            pass
+        print(f"{name}: {8192 / (time.process_time() - start):,.0f}/s")
+    start = time.process_time()
+    drawn = list(sample_attributes(models["full"], 4000, rng=rng))
+    print(f"as objects: {4000 / (time.process_time() - start):,.0f}/s")
     print(f"physically possible: {np.mean([possible(a) for a in drawn]):.2%}")
     mass = replace(MassAttributes(), bbox=held[3].mass.bbox)
     start = time.process_time()
     given = Attributes("g", mass=mass)
-    list(sample_attributes(models["full"], 4000, rng=rng, given=given, options=QUICK))
+    list(sample_lines(models["full"], 4000, rng=rng, given=given, options=QUICK, provenance=None))
     print(f"given the bounding box: {4000 / (time.process_time() - start):,.0f}/s")
     for name, model in models.items():
         print(f"front porch meets garage, {name}: {clashes(model, held, 40):.2%}")
+        with patch.object(physical, "_out_of_garage"):
+            print(f"    before porches step out of garages: {clashes(model, held, 40):.2%}")
     print(f"the held-out houses themselves: {np.mean([clash(a) for a in held]):.2%}")
     top = SampleOptions(top=True)
     best = sample_attributes(models["full"], 1000, rng=rng, options=top)

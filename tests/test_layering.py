@@ -218,6 +218,13 @@ class TestAlignment:
             keys = [full_key(one.alignment, 6.0) for one in (mixed, single)]
             assert keys[0] == keys[1]
 
+    def test_whole_sizes_and_an_unsized_symbol(self):
+        """A range that is rounded to whole metres would make four columns look as good."""
+        rules = {"A": Rule(2), "B": Rule(2), "C": Rule(1, opaque=False), "e": Rule(None)}
+        found = answer(direction([CEC, parse("ABBA")], 8.0, rules))
+        assert found.alignment.omega == pytest.approx(2.0, abs=1e-8)
+        assert columns(found.alignment) == [["C", "e", "C"], ["A", "BB", "A"]]
+
     def test_unoccludable_lets_nothing_above(self):
         rules = {"A": Rule(2), "B": Rule(2, unoccludable=True), "C": Rule(2), "t": Rule(2)}
         nodes = [Substituted(parse("ctc"), (("c", parse("C")),)), parse("ABA")]

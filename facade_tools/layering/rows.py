@@ -97,15 +97,21 @@ class Scale:
 
 
 def scale_of(direction: Direction) -> Scale:
-    """Return the scale in which all sizes of a direction are whole, or fine enough."""
+    """Return the scale in which all sizes of a direction are whole, or fine enough.
+
+    The ranges of unsized symbols are rounded outwards: there the scale has to be fine in any case,
+    or what is worse within a unit would pass for as good.
+    """
+    fine = math.ceil(math.log10(UNITS / direction.canvas))
+    first = max(0, fine) if any(r.size is None for r in direction.rules.values()) else 0
     sizes = [rule.size for rule in direction.rules.values() if rule.size is not None]
-    for digits in range(MAX_DIGITS):
+    for digits in range(first, max(MAX_DIGITS, first + 1)):
         scale = 10.0**digits
         if all(
             abs(size * scale - round(size * scale)) < 1e-7 for size in [*sizes, direction.canvas]
         ):
             return Scale(scale)
-    return Scale(10.0 ** max(0, math.ceil(math.log10(UNITS / direction.canvas))))
+    return Scale(10.0 ** max(0, fine))
 
 
 class Graph(NamedTuple):

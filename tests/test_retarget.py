@@ -18,9 +18,11 @@ from facade_tools.artifacts.blocks import Block, Blocks
 from facade_tools.artifacts.design import Canvas
 from facade_tools.artifacts.layout import Layout, LayoutShape
 from facade_tools.formats.mesh_reader import read_textured
+from facade_tools.formats.style_folder import write_style
 from facade_tools.formats.textured import joined
 from facade_tools.stylization.bases import layout_blocks, with_ends
 from facade_tools.stylization.capture import capture_style
+from facade_tools.stylization.drawing import sheet_picture
 from facade_tools.stylization.hull import layers, mass
 from facade_tools.stylization.model import CaptureOptions
 from facade_tools.stylization.panels import panels, reassigned, rectangles
@@ -316,6 +318,15 @@ def test_several_styles_and_the_same_bytes_again(facade, tmp_path):
         )  # fmt: skip
         assert done.returncode == 0, done.stderr
     assert (tmp_path / "1/b.glb").read_bytes() == (tmp_path / "2/b.glb").read_bytes()
+
+
+def test_a_sheet_is_drawn_with_and_without_its_files(styles, tmp_path):
+    style = styles["u-court"]
+    write_style(tmp_path, style.sheet, style.blocks, style.pictures)
+    alone, whole = sheet_picture(style.sheet), sheet_picture(style.sheet, tmp_path)
+    assert whole.shape[1] == alone.shape[1]
+    assert whole.shape[0] > 1.3 * alone.shape[0]  # the model and the signal too
+    assert np.array_equal(sheet_picture(style.sheet, tmp_path / "nowhere"), alone)
 
 
 GOLDEN = Path(__file__).parent / "golden" / "styles"

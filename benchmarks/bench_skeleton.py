@@ -17,6 +17,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -78,18 +79,15 @@ def node_error(contour: Contour, found: Faces) -> float:
 def run(method: Callable[[Rings], Faces], polygons: list[Rings], limit: float) -> dict[str, float]:
     seconds, bad = [], 0
     for rings in polygons:
-        signal.setitimer(signal.ITIMER_REAL, limit)
-        start = time.process_time()
-        try:
-            found = method(rings)
-            seconds.append(time.process_time() - start)
-            signal.setitimer(signal.ITIMER_REAL, 0)
-            bad += not good(rings, found)
-        except Exception:  # a peer may fail in any way
-            seconds.append(time.process_time() - start)
-            bad += 1
-        finally:
-            signal.setitimer(signal.ITIMER_REAL, 0)
+        start, found = time.process_time(), None
+        with suppress(Exception):  # a peer may fail in any way
+            signal.setitimer(signal.ITIMER_REAL, limit)
+            try:
+                found = method(rings)
+            finally:
+                signal.setitimer(signal.ITIMER_REAL, 0)
+        seconds.append(time.process_time() - start)
+        bad += found is None or not good(rings, found)
     middle, high, worst = (1e3 * float(np.percentile(seconds, q)) for q in (50, 95, 100))
     rate = len(seconds) / sum(seconds)
     return {"failed": bad, "median": middle, "p95": high, "max": worst, "rate": rate}

@@ -91,10 +91,6 @@ class Scale:
         """Return an upper bound in units."""
         return math.ceil(metres * self.units - 1e-6)
 
-    def metres(self, units: int) -> float:
-        """Return units in metres."""
-        return float(units) / self.units
-
 
 def scale_of(direction: Direction) -> Scale:
     """Return the scale in which all sizes of a direction are whole, or fine enough.

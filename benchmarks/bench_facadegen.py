@@ -316,7 +316,7 @@ ABLATIONS = {
 }
 
 
-def bench_ablation(folder: str = "ablation") -> None:
+def bench_ablation(folder: str = "build/ablation") -> None:
     """Leave out one attribute of the targets at a time; writes buildings to look at."""
     houses = [undressed(house) for house in held_out(3)]
     for name, left_out in ABLATIONS.items():

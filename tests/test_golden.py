@@ -11,17 +11,22 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 GOLDEN = ROOT / "tests" / "golden"
-SAMPLES = ROOT / "sample_data" / "houses"
+SAMPLES = ROOT / "sample_data"
 
 # name of the golden file -> the command that writes it
 CHAIN = {
-    "attributes.jsonl": ["attributes", "farmhouse.jsonl"],
+    "attributes.jsonl": ["attributes", "houses/farmhouse.jsonl"],
     "model.json": ["learn", "attributes.jsonl", "--restarts", "1"],
     "sampled.jsonl": ["sample", "model.json", "-n", "3", "--seed", "1"],
     "masses.jsonl": ["massgen", "sampled.jsonl", "--seed", "1"],
     "facades.jsonl": ["facadegen", "masses.jsonl", "--seed", "1"],
+    "parses.jsonl": ["parse-image", "photos/facade-1.jpg", "photos/facade-3.jpg"],
+    "parses-mrf.jsonl": ["parse-image", "photos/facade-1.jpg", "--method", "mrf"],
+    "assembled.jsonl": ["assemble", "parses.jsonl"],
+    "derived.jsonl": ["derive", "haussmann", "-n", "2", "--seed", "1"],
+    "reconstructed.jsonl": ["reconstruct", "parses.jsonl", "--image", "photos/"],
 }
-PARALLEL = ("attributes", "massgen", "facadegen")
+PARALLEL = ("attributes", "massgen", "facadegen", "parse-image", "assemble", "reconstruct")
 
 
 def locate(name: str) -> Path:
@@ -30,7 +35,7 @@ def locate(name: str) -> Path:
 
 def run(facade, tmp_path: Path, name: str, *options: str) -> bytes:
     target = tmp_path / name
-    words = [str(locate(word)) if "." in word else word for word in CHAIN[name]]
+    words = [str(locate(word)) if "." in word or "/" in word else word for word in CHAIN[name]]
     done = facade(*words, *options, "-o", target)
     assert done.returncode == 0, done.stderr
     return target.read_bytes()

@@ -99,7 +99,7 @@ class Rule:
 class StyleSheet:
     """The look of a building: `density` pixels a metre of its textures, `roof` the view from above.
 
-    resolution: pixels a metre of the source's own textures, where its pictures are finer or coarser.
+    resolution: pixels a metre of the source's own textures, where they are finer or coarser.
     lost: share of the source's surface that its Manhattan model does not stand for.
     """
 

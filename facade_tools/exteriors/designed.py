@@ -28,8 +28,9 @@ def designed_pieces(
     """Return by piece id the elements of designed walls.
 
     A design is solved for the largest plane of general boxes of its side, all storeys together.
-    They count as known: a design is the user's word. Elements that would cross a storey line, leave the wall or meet a roof are left out with a
-    warning. Raises Infeasible where a design has no layout of that size.
+    Its elements count as known: a design is the user's word. Elements that would cross a storey
+    line, leave the wall or meet a roof are left out with a warning. Raises Infeasible where a
+    design has no layout of that size.
     """
     kinds = {box.id: box.kind for box in building.boxes}
     found: dict[str, tuple[Element, ...]] = {}

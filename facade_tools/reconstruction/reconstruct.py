@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 
 from ..artifacts.building import Building, Colors
@@ -14,6 +13,7 @@ from ..artifacts.parse import Parse
 from ..errors import InvalidInput
 from ..geometry.arrays import Floats, Points2, Points3
 from ..geometry.mesh import Scene
+from ..imaging.homography import warped
 from ..imaging.image_io import Picture
 from .boxed import derived_building
 from .drawing import Look, Painted, derived_scene
@@ -105,8 +105,7 @@ def _rectified(photo: Picture, parse: Parse, shape: tuple[int, ...]) -> Picture:
     """Return the photograph in the pixels of the parse's regions."""
     turn = np.array(parse.rectification, float)
     if not np.allclose(turn, np.eye(3)):
-        size = (shape[1], shape[0])
-        return np.asarray(cv2.warpPerspective(photo, turn, size), dtype=np.uint8)
+        return warped(photo, turn, (shape[1], shape[0]))
     if photo.shape[:2] != tuple(shape):
         found, wanted = (f"{s[1]}×{s[0]}" for s in (photo.shape, shape))
         raise InvalidInput(f"the picture has {found} pixels; the parse is of {wanted}")

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .coordinates import Bits, Floats
+from .dataset import Masks
+from .full_plans import Part, rectangle_exposure, snapped_garage, touching
 from .groups import ABSENT, ATOM_TOLERANCE
 from .layout import Layout
 
@@ -89,6 +91,7 @@ def settle(
     _raise_eaves(values, layout, fixed)
     columns, held = Columns(values, layout), Columns(fixed or (), layout) if fixed else None
     _garage(columns, held)
+    _settle_garage(columns, held)
     for name, sign in (("porch_front", -1), ("porch_back", 1)):
         place = columns.get(f"{name}.py")
         if place:
@@ -96,6 +99,49 @@ def settle(
             moved = np.minimum(place[0], limit) if sign < 0 else np.maximum(place[0], limit)
             _put(place[0], moved, held, f"{name}.py")
             _out_of_garage(columns, held, name, sign)
+            _settle_porch(columns, held, name, sign)
+
+
+HOUSE = ("width", "depth", "bcr")
+EXPOSED = ("px", "py", "width", "depth", "exposure")
+
+
+def _full_part(
+    columns: Columns, held: Columns | None, name: str
+) -> tuple[tuple[Floats, Floats], Part, Masks] | None:
+    """Return houses and parts of the rows whose plan is a full rectangle and no value given.
+
+    None where the layout lacks a column or there is no such row.
+    """
+    house, part = columns.get(*HOUSE), columns.get(*(f"{name}.{c}" for c in EXPOSED))
+    if not house or not part:
+        return None
+    width, depth, bcr = house
+    rows = (np.abs(bcr - 1) <= ATOM_TOLERANCE) & np.isfinite(part[2])
+    if held is not None:
+        given = held.get(*(f"{name}.{c}" for c in EXPOSED)) or []
+        rows &= ~np.any([column != 0 for column in given], axis=0)
+    if not rows.any():
+        return None
+    return (width[rows], depth[rows]), Part(*(column[rows] for column in part)), rows
+
+
+def _settle_garage(columns: Columns, held: Columns | None) -> None:
+    found = _full_part(columns, held, "garage")
+    if found:
+        house, part, rows = found
+        places = columns.get("garage.px", "garage.py", "garage.exposure") or []
+        for column, value in zip(places, snapped_garage(house, part), strict=True):
+            column[rows] = value
+
+
+def _settle_porch(columns: Columns, held: Columns | None, name: str, sign: int) -> None:
+    found = _full_part(columns, held, name)
+    if found:
+        house, part, rows = found
+        (py, exposure) = columns.get(f"{name}.py", f"{name}.exposure") or (part.py, part.exposure)
+        py[rows] = touching(house, part, sign)
+        exposure[rows] = rectangle_exposure(house, part._replace(py=py[rows]))
 
 
 def _out_of_garage(columns: Columns, held: Columns | None, name: str, sign: int) -> None:

@@ -18,7 +18,8 @@ WIDTH = 96
 
 def cli_reference() -> str:
     """Return the page of the command line: the group's help, then every stage's."""
-    root = click.Context(facade, info_name="facade", max_content_width=WIDTH, terminal_width=WIDTH)
+    settings: dict[str, Any] = {**facade.context_settings, "max_content_width": WIDTH}
+    root = click.Context(facade, info_name="facade", terminal_width=WIDTH, **settings)
     parts = [
         "# Command line reference\n",
         "Written by `make docs` from the help texts.\n",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -101,7 +102,7 @@ def _to_folder(stream: StreamOptions, folder: Path, convert: Files) -> None:
         if file_name(identity) in seen:
             raise InvalidInput(f"id {identity!r} stands twice; expected unique ids in a folder")
         seen.add(file_name(identity))
-        _write(folder, files)
+        write_files(folder, files)
 
 
 def _to_file(stream: StreamOptions, path: Path, form: str | None, arrange: str) -> None:
@@ -112,7 +113,7 @@ def _to_file(stream: StreamOptions, path: Path, form: str | None, arrange: str) 
     stem = path.name[: -len(end)] if path.name.lower().endswith(end) else path.stem
     files = model_files(_parts(stream, form, arrange), file_name(stem), form)
     renamed = {_as_named(name, file_name(stem) + end, path): data for name, data in files.items()}
-    _write(path.parent, renamed)
+    write_files(path.parent, renamed)
 
 
 def _as_named(name: str, main: str, path: Path) -> str:
@@ -144,7 +145,8 @@ def _parts(stream: StreamOptions, form: str, arrange: str) -> list[Any]:
     return arranged
 
 
-def _write(folder: Path, files: dict[str, bytes]) -> None:
+def write_files(folder: Path, files: Mapping[str, bytes]) -> None:
+    """Write files into a folder, made where it is missing. Raises OutputFailed."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

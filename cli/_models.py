@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,11 +13,11 @@ import click
 from facade_tools.artifacts.building import Frame
 from facade_tools.artifacts.documents import encode
 from facade_tools.artifacts.numbers import dump_document, dump_line
-from facade_tools.artifacts.writing import write_bytes
-from facade_tools.errors import InvalidInput, OutputFailed
+from facade_tools.errors import InvalidInput
 from facade_tools.formats.exporting import model_files, placed
 from facade_tools.geometry.mesh import Scene
 
+from ._export import write_files
 from ._stream import file_name, is_folder, open_sink
 
 MODELS = (".glb", ".obj")
@@ -97,7 +97,7 @@ def _bytes(artifact: Any, output: str | None) -> bytes:
 
 def _alone(made: Made, folder: Path) -> None:
     assert made.scene is not None
-    _write(folder, model_files([made.scene], file_name(made.id), "glb"))
+    write_files(folder, model_files([made.scene], file_name(made.id), "glb"))
 
 
 def _model(rows: list[Made], path: Path) -> None:
@@ -105,13 +105,4 @@ def _model(rows: list[Made], path: Path) -> None:
     scenes = placed([row.scene for row in rows if row.scene], "auto", [row.frame for row in rows])
     files = model_files(scenes, file_name(path.stem), form)
     main = f"{file_name(path.stem)}.{form}"
-    _write(path.parent, {path.name if name == main else name: d for name, d in files.items()})
-
-
-def _write(folder: Path, files: Mapping[str, bytes]) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputFailed(f"{folder}: cannot be made: {error.strerror}") from error
-    for name, data in files.items():
-        write_bytes(folder / name, data)
+    write_files(path.parent, {path.name if name == main else name: d for name, d in files.items()})

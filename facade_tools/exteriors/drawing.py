@@ -20,7 +20,7 @@ from .neighbours import Neighbours
 from .network import Network
 from .physical import storey_heights
 from .sampling import draw_block
-from .serialisation import network_of
+from .serialisation import ModelKey, network_of
 from .shared_values import SharedValues, shared_values
 
 POOL = 2000  # draws of which --top keeps the most probable
@@ -82,25 +82,12 @@ def source_of(model: Model, given: Attributes | None, options: SampleOptions) ->
     if options.style is not None and options.style >= len(network.style):
         count = len(network.style)
         raise InvalidInput(f"style {options.style}; expected one of the model's {count}, from 0")
-    finder, shared = _lookups(_Key(model))
+    finder, shared = _lookups(ModelKey(model))
     return Source(model, network, finder, () if options.smooth else shared, given, options)
 
 
-@dataclass(frozen=True)
-class _Key:
-    """A model compared by identity: trees over its training rows are built once."""
-
-    model: Model
-
-    def __hash__(self) -> int:
-        return id(self.model)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Key) and self.model is other.model
-
-
 @lru_cache(maxsize=4)
-def _lookups(key: _Key) -> tuple[Neighbours, tuple[SharedValues, ...]]:
+def _lookups(key: ModelKey) -> tuple[Neighbours, tuple[SharedValues, ...]]:
     network = network_of(key.model)
     return Neighbours(key.model, network), shared_values(key.model, network)
 

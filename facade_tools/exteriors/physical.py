@@ -83,7 +83,8 @@ def settle(
     """Move complete rows, in place, to what is possible.
 
     Ranges; r2 only above an r1; the garage inside the bounding box and not higher; porches on
-    their side of the middle and outside the garage. fixed (n, d) a group: 1 where a value is given
+    their side of the middle and outside the garage; at a full rectangle, exposures as places fix
+    them (`full_plans`). fixed (n, d) a group: 1 where a value is given
     and must stay.
     """
     _ranges(values, layout, fixed)

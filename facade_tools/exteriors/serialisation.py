@@ -98,12 +98,12 @@ def bits_to_model(network: Network) -> tuple[ModelBits, ...]:
 
 
 @lru_cache(maxsize=8)
-def _cached(key: _Key) -> Network:
+def _cached(key: ModelKey) -> Network:
     return _network(key.model)
 
 
 @dataclass(frozen=True)
-class _Key:
+class ModelKey:
     """A model compared by identity: its arrays are built once."""
 
     model: Model
@@ -112,7 +112,7 @@ class _Key:
         return id(self.model)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Key) and self.model is other.model
+        return isinstance(other, ModelKey) and self.model is other.model
 
 
 def network_of(model: Model) -> Network:
@@ -121,7 +121,7 @@ def network_of(model: Model) -> Network:
     Raises InvalidInput where it cannot be a model: probabilities that do not sum to 1, a
     covariance that is not positive definite, shapes that disagree, edges in a cycle.
     """
-    return _cached(_Key(model))
+    return _cached(ModelKey(model))
 
 
 def _network(model: Model) -> Network:

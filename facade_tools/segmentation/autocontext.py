@@ -22,7 +22,7 @@ from ..imaging.features_context import (
 )
 from ..imaging.image_io import fitted
 from .final import finished, planes_of
-from .trees import LEAD, Codes, Trees, softmax
+from .trees import Codes, Trees, softmax
 
 Labels = NDArray[np.uint8]  # (height, width), 0 is ignored, k is class k - 1
 
@@ -68,7 +68,7 @@ def predict(trees: Trees, features: Features, stride: int = 1) -> Probabilities:
     count, height, width = features.shape
     asked = features[:, ::stride, ::stride]
     codes = np.ascontiguousarray(asked.reshape(count, -1).T)
-    shares = np.ascontiguousarray(softmax(trees.scores(codes, LEAD)).T)
+    shares = np.ascontiguousarray(softmax(trees.scores(codes)).T)
     coarse = shares.reshape(-1, *asked.shape[1:])
     return coarse if stride == 1 else _between(coarse, stride, (height, width))
 

@@ -165,9 +165,15 @@ def _check(parts: Mapping[str, NDArray[Any]], number: int, classes: int) -> None
         raise InvalidInput(f"arrays of stage {number} have different lengths")
     child, leaf = parts["child"], parts["child"] == np.arange(count)
     top = np.where(leaf, child, child + 1)
-    bad = child.min() < 0 or top.max() >= count or (parts["threshold"][leaf] != 255).any()
-    roots = parts["root"]
-    if bad or roots.min() < 0 or roots.max() >= count or parts["feature"].min() < 0:
+    roots = parts["root"].astype(np.int64)
+    ends = np.append(roots[1:], count)
+    if roots[0] != 0 or (ends <= roots).any() or parts["feature"].min() < 0:
+        raise InvalidInput(f"trees of stage {number} are out of order")
+    last = np.repeat(ends, ends - roots)  # of the own tree
+    bad = (child < np.arange(count) + ~leaf).any() or (top >= last).any()
+    inner = child[~leaf]
+    once = len(np.unique([inner, inner + 1])) == 2 * len(inner) == count - len(roots)
+    if bad or not once or (parts["threshold"][leaf] != 255).any():
         raise InvalidInput(f"indices of stage {number} lead out of its arrays")
     if parts["depth"].min() < 0 or parts["depth"].max() > 64:
         raise InvalidInput(f"depths of stage {number} are out of range")

@@ -16,7 +16,7 @@ from ..imaging.features_context import (
     repeated,
 )
 from ..imaging.features_fine import enlarged, fine_features
-from .trees import LEAD, Codes, Trees, softmax
+from .trees import Codes, Trees, softmax
 
 CERTAIN = 0.98  # what the stages before believe more than this stays
 BLOCK = 20_000  # pixels whose codes are in memory at once, in each thread
@@ -78,7 +78,7 @@ def finished(trees: Trees, planes: Planes) -> Probabilities:
         out[:] = planes.belief.reshape(trees.classes, -1)
 
     def fill(at: NDArray[np.intp]) -> None:
-        out[:, at] = softmax(trees.scores(planes.codes(at), LEAD)).T
+        out[:, at] = softmax(trees.scores(planes.codes(at))).T
 
     blocks = [where[start : start + BLOCK] for start in range(0, len(where), BLOCK)]
     with ThreadPoolExecutor(THREADS) as pool:  # compiled loops let go of the interpreter

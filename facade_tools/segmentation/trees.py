@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 
 from ..compiled import compiled
 from ..errors import InvalidInput
+from .masks import MOST_LEAVES, add_masked_scores, lowest_bits
 
 Codes = NDArray[np.uint8]  # (pixels, features), C order
 
 BLOCK = 64  # pixels that stay in the first cache while all trees pass over them
-ROUNDS = 8  # trees a class between two looks at the lead
-LEAD = 5.0  # nats: a lead that more trees do not turn
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,17 +35,24 @@ class Trees:
     depth: NDArray[np.int16]
     classes: int
 
-    def scores(self, codes: Codes, margin: float = np.inf) -> NDArray[np.float32]:
-        """Return the summed scores, (pixels, classes). Raises InvalidInput on too few features.
-
-        A pixel whose best class leads by more than `margin` is asked no further.
-        """
+    def scores(self, codes: Codes) -> NDArray[np.float32]:
+        """Return the summed scores, (pixels, classes). Raises InvalidInput on too few features."""
         if int(self.feature.max()) >= codes.shape[1]:
             raise InvalidInput("the classifier was trained on other features than these")
         out = np.zeros((len(codes), self.classes), np.float32)
         arrays = (self.feature, self.threshold, self.child, self.value)
-        add_scores(codes, *arrays, self.root, self.depth, margin, out)
+        if self.small:
+            first = np.append(self.root, len(self.child)).astype(np.int64)
+            add_masked_scores(codes, *arrays, first, lowest_bits(), out)
+        else:
+            add_scores(codes, *arrays, self.root, self.depth, out)
         return out
+
+    @property
+    def small(self) -> bool:
+        """Whether the faster loop serves: few leaves a tree, and one value a leaf."""
+        leaves = np.add.reduceat(self.child == np.arange(len(self.child)), self.root)
+        return self.value.shape[1] == 1 and int(leaves.max()) <= MOST_LEAVES
 
 
 @compiled
@@ -58,24 +64,16 @@ def add_scores(
     value: NDArray[np.float32],
     root: NDArray[np.int32],
     depth: NDArray[np.int16],
-    margin: float,
     out: NDArray[np.float32],
 ) -> None:
     """Add every tree's leaf values to `out` (pixels, classes); blocks of pixels outermost."""
     classes = out.shape[1]
     wide = value.shape[1] > 1
-    every = ROUNDS * classes
-    active = np.empty(BLOCK, np.int64)
     for start in range(0, codes.shape[0], BLOCK):
-        left = min(BLOCK, codes.shape[0] - start)
-        for i in range(left):
-            active[i] = start + i
+        stop = min(start + BLOCK, codes.shape[0])
         for tree in range(root.shape[0]):
-            if tree % every == 0 and tree > 0:
-                left = _undecided(active, left, out, margin)
             own = tree % classes
-            for i in range(left):
-                pixel = active[i]
+            for pixel in range(start, stop):
                 node = root[tree]
                 for _ in range(depth[tree]):
                     node = child[node] + (codes[pixel, feature[node]] > threshold[node])
@@ -84,25 +82,6 @@ def add_scores(
                         out[pixel, k] += value[node, k]
                 else:
                     out[pixel, own] += value[node, 0]
-
-
-@compiled
-def _undecided(
-    active: NDArray[np.int64], left: int, out: NDArray[np.float32], margin: float
-) -> int:
-    """Keep the pixels whose best class leads by at most `margin`; returns how many."""
-    kept = 0
-    for i in range(left):
-        first = second = -np.inf
-        for score in out[active[i]]:
-            if score > first:
-                first, second = score, first
-            elif score > second:
-                second = score
-        if first - second <= margin:
-            active[kept] = active[i]
-            kept += 1
-    return kept
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ from pathlib import Path
 import click
 
 from facade_tools.artifacts.blocks import Blocks
+from facade_tools.artifacts.building import Building
 from facade_tools.artifacts.layout import Layout
 from facade_tools.artifacts.provenance import Provenance
 from facade_tools.artifacts.store import digest, read_raw
@@ -23,6 +24,7 @@ from facade_tools.randomness import item_generator
 from facade_tools.stylization.bases import building_blocks, layout_blocks, mesh_blocks, with_ends
 from facade_tools.stylization.capture import capture_style
 from facade_tools.stylization.model import CaptureOptions
+from facade_tools.stylization.pitched import crowned
 from facade_tools.stylization.resizing import resized
 from facade_tools.stylization.retarget import Style, retarget
 from facade_tools.stylization.structure import chosen_style
@@ -73,7 +75,7 @@ def run_retarget(
     sizes = dict(_size(text) for text in resize)
     progress = Progress("retarget")
     seen: set[str] = set()
-    for base, plain in _bases(bases):
+    for base, plain, building in _bases(bases):
         blocks = resized(base, sizes) if sizes else base
         rng = item_generator(seed, "retarget", base.id)
         style = chosen_style([s.sheet.blocks for s in sheets], blocks.blocks, rng=rng)
@@ -81,6 +83,8 @@ def run_retarget(
         if plain:
             blocks = with_ends(blocks, chosen.blocks)
         scene = retarget(chosen, blocks, small)
+        if building is not None and not sizes:
+            scene = crowned(scene, chosen, building)
         if base.id in seen and is_folder(output):
             raise InvalidInput(f"id {base.id!r} stands twice; expected unique ids in a folder")
         if seen and not is_folder(output):
@@ -104,20 +108,24 @@ def _size(text: str) -> tuple[str, tuple[float, float, float]]:
     return match.group(1), (numbers[0], numbers[1], numbers[2])
 
 
-def _bases(paths: Sequence[str]) -> Iterator[tuple[Blocks, bool]]:
-    """Yield every base, and whether it may be given a bottom and a top."""
+def _bases(paths: Sequence[str]) -> Iterator[tuple[Blocks, bool, Building | None]]:
+    """Yield every base, whether it may be given a bottom and a top, and the building it is of."""
     for path in paths:
         if Path(path).suffix.lower() in ENDINGS:
-            yield mesh_blocks(read_textured(Path(path)), file_name(Path(path).parent.name)), True
+            yield (
+                mesh_blocks(read_textured(Path(path)), file_name(Path(path).parent.name)),
+                True,
+                None,
+            )
             continue
         for item in read_raw([path]):
             artifact = item.artifact("blocks", "building", "layout")
             if isinstance(artifact, Blocks):
-                yield artifact, False
+                yield artifact, False, None
             elif isinstance(artifact, Layout):
-                yield layout_blocks(artifact), True
+                yield layout_blocks(artifact), True, None
             else:
-                yield building_blocks(artifact), True
+                yield building_blocks(artifact), True, artifact
 
 
 def _target(output: str, identity: str) -> tuple[str, str, Path]:

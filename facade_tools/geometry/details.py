@@ -39,25 +39,45 @@ def building_scene(building: Building) -> Scene:
     Raises InvalidInput where no mass can be built, as of a partial building without heights.
     """
     solid = building_solid(building)
-    overhang = {box.id: box.roof.overhang for box in building.boxes if box.roof is not None}
     colors = building.colors or _own_colors(building.id)
     pattern = wall_pattern(building, colors.wall)
     meshes = [
         mass_mesh(solid),
         *cladding(solid, pattern),
         *corner_boards(solid, pattern),
-        *roof_slabs(solid, overhang),
+        *_roofs(building, solid),
     ]
     for side in SIDES:
         if side in building.facades:
             for index, piece in enumerate(building.facades[side].pieces, 1):
                 meshes += _piece(f"{side}/piece-{index}", side, piece)
+    meshes += _attached(building)
+    return Scene(building.id, tuple(meshes), materials(colors, pattern))
+
+
+def crown_scene(building: Building, solid: Solid | None) -> Scene:
+    """Return what stands over and before a building's walls: roof slabs, porches, chimneys.
+
+    solid: of the building, for the slabs of its roofs; None leaves them out.
+    """
+    meshes = [] if solid is None else _roofs(building, solid)
+    colors = building.colors or _own_colors(building.id)
+    return Scene(building.id, (*meshes, *_attached(building)), materials(colors))
+
+
+def _roofs(building: Building, solid: Solid) -> list[Mesh]:
+    overhang = {box.id: box.roof.overhang for box in building.boxes if box.roof is not None}
+    return roof_slabs(solid, overhang)
+
+
+def _attached(building: Building) -> list[Mesh]:
+    meshes = []
     porches = [box for box in building.boxes if box.kind == "porch"]
     for index, box in enumerate(porches, 1):
         meshes += porch(f"porch-{index}", box, building)
     for index, stack in enumerate(building.chimneys, 1):
         meshes += chimney(f"chimney-{index}", stack, 0.0)
-    return Scene(building.id, tuple(meshes), materials(colors, pattern))
+    return meshes
 
 
 def building_sketch(building: Building) -> Scene:

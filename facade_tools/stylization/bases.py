@@ -34,7 +34,7 @@ def building_blocks(building: Building) -> Blocks:
         for rectangle in _minus(_rectangle(box), taken):
             blocks.append(_block(box, rectangle, len(blocks), building.storey_height))
             taken.append(rectangle)
-    return Blocks(building.id, tuple(blocks), _frame(building))
+    return Blocks(building.id, tuple(blocks), frame_of(building))
 
 
 def _rectangle(box: Box) -> Rectangle:
@@ -142,7 +142,8 @@ def _with_ends(block: Block, foot: float, head: float) -> list[Block]:
     return parts
 
 
-def _frame(building: Building) -> tuple[tuple[float, ...], ...] | None:
+def frame_of(building: Building) -> tuple[tuple[float, ...], ...] | None:
+    """Return where a building stands (4, 4), None where it does not say."""
     if building.frame is None:
         return None
     angle = math.radians(building.frame.rotation)

@@ -1,0 +1,147 @@
+"""Roofs, gables, porches and chimneys of a building over walls in another style."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from ..artifacts.building import Building
+from ..artifacts.stylesheet import StyleFace, StyleSheet
+from ..geometry.arrays import Floats, Points3
+from ..geometry.details import crown_scene
+from ..geometry.mesh import Material, Mesh, Scene
+from ..geometry.solids import Solid, building_solid, triangulated
+from ..geometry.triangulate import newell_normal
+from ..imaging.image_io import Picture
+from .atlas import encoded_page
+from .bases import frame_of
+from .retarget import RAISED, Style
+from .splitting import SplitRule
+from .synthesis import resized_rule
+
+WITHIN = 0.1  # of a plain section, left out at either end: lintels and sills reach into it
+SLIVER = 1e-4  # m above the eaves: what stands lower is the rounding of the solid
+LONGEST = 512  # pixels of a plain wall's texture
+Piece = tuple[Picture, tuple[float, float]]  # and its width and height, m
+
+
+def crowned(scene: Scene, style: Style, building: Building) -> Scene:
+    """Return a retargeted building under its own roofs, with its porches and chimneys.
+
+    Roofs keep the building's colour; gables take a plain piece of the style's wall, mirrored so
+    that it repeats without seams. A building of flat roofs alone keeps the style's roofs.
+    """
+    solid = building_solid(building)
+    pitched = any(box.roof is not None and box.roof.style != "flat" for box in building.boxes)
+    crown = crown_scene(building, solid if pitched else None)
+    meshes, materials = list(crown.meshes), dict(crown.materials)
+    if pitched:
+        picture, size = plain_wall(style)
+        meshes.append(_gables(building, solid, size))
+        materials["gable"] = Material("gable", "#ffffff", texture=encoded_page(picture))
+    frame = frame_of(building)
+    if frame is not None:
+        turn = np.array(frame)
+        meshes = [replace(m, vertices=m.vertices @ turn[:3, :3].T + turn[:3, 3]) for m in meshes]
+    used = {mesh.material for mesh in meshes}
+    kept = {f"own-{name}": replace(materials[name], name=f"own-{name}") for name in sorted(used)}
+    own = [replace(m, material=f"own-{m.material}") for m in meshes if len(m.faces)]
+    return replace(scene, meshes=(*scene.meshes, *own), materials={**scene.materials, **kept})
+
+
+# --- gables ---------------------------------------------------------------------------------------
+def _gables(building: Building, solid: Solid, period: tuple[float, float]) -> Mesh:
+    """Return what of the solid's walls stands above the eaves, a little before it."""
+    eaves = {box.id: float(box.height or 0.0) + SLIVER for box in building.boxes}
+    vertices, triangles, owners = triangulated(solid)
+    corners: list[Points3] = [np.zeros((0, 3))]
+    uv = [np.zeros((0, 2))]
+    for triangle, owner in zip(triangles, owners, strict=True):
+        label = solid.labels[owner]
+        if label.semantic != "wall":
+            continue
+        normal = newell_normal(vertices[triangle])
+        normal = normal / max(float(np.linalg.norm(normal)), 1e-12)
+        for piece in _above(vertices[triangle], eaves.get(label.owner, math.inf)):
+            corners.append(piece + RAISED * normal)
+            along = piece[:, :2] @ np.array([-normal[1], normal[0]])
+            uv.append(np.column_stack([along, piece[:, 2]]) / np.array(period))
+    points = np.concatenate(corners)
+    faces = np.arange(len(points), dtype=np.int64).reshape(-1, 3)
+    return Mesh("gables", points, faces, "gable", np.concatenate(uv))
+
+
+def _above(triangle: Points3, height: float) -> Iterator[Points3]:
+    """Yield the triangles (3, 3) of what stands above a height."""
+    ring: list[Floats] = []
+    for a, b in zip(triangle, np.roll(triangle, -1, axis=0), strict=True):
+        if a[2] > height:
+            ring.append(a)
+        if (a[2] > height) != (b[2] > height):
+            ring.append(a + (height - a[2]) / (b[2] - a[2]) * (b - a))
+    for k in range(1, len(ring) - 1):
+        yield np.array([ring[0], ring[k], ring[k + 1]])
+
+
+# --- a plain piece of wall ------------------------------------------------------------------------
+def plain_wall(style: Style) -> tuple[Picture, tuple[float, float]]:
+    """Return a piece of wall without windows, mirrored to repeat, and its size (m).
+
+    It stands beside windows where a face has any, otherwise it is the whole face. Of the faces
+    between bottom and top, where there are any, the texture of the most wall gives it.
+    """
+    body = {block.id for block in style.sheet.blocks if block.role == "body"}
+    walls = [wall for wall in style.sheet.walls if wall.block in body] or style.sheet.walls
+    pieces: dict[str, list[Piece]] = {}
+    for face in (face for wall in walls for face in wall.faces):
+        pieces.setdefault(face.texture, []).append(_piece(style, face))
+    found = max(pieces.values(), key=lambda some: math.fsum(math.prod(size) for _, size in some))
+    picture, (width, height) = max(found, key=lambda piece: math.prod(piece[1]))
+    row = np.concatenate([picture, picture[:, ::-1]], axis=1)
+    return np.concatenate([row, row[::-1]]), (2 * width, 2 * height)
+
+
+def _piece(style: Style, face: StyleFace) -> Piece:
+    picture = style.pictures[face.texture]
+    size = abs(face.end - face.start), face.top - face.bottom
+    columns = _longest(_rule(style.sheet, face.vertical), size[0], windows=False)
+    rows = _longest(_rule(style.sheet, face.horizontal), size[1], windows=True)
+    (left, right), (upper, lower) = (
+        (int(low / total * pixels), max(int(low / total * pixels) + 1, int(high / total * pixels)))
+        for (low, high), total, pixels in (
+            (columns, size[0], picture.shape[1]),
+            (rows, size[1], picture.shape[0]),
+        )
+    )
+    part = picture[upper:lower, left:right][:LONGEST, :LONGEST]
+    metres = (
+        size[0] * part.shape[1] / picture.shape[1],
+        size[1] * part.shape[0] / picture.shape[0],
+    )
+    return part, metres
+
+
+def _rule(sheet: StyleSheet, group: str) -> SplitRule:
+    wanted = next(g.rule for g in sheet.groups if g.id == group)
+    rule = next(r for r in sheet.rules if r.id == wanted)
+    return SplitRule(rule.a, rule.b)
+
+
+def _longest(rule: SplitRule, size: float, windows: bool) -> tuple[float, float]:
+    """Return from where to where (m) the longest section of windows, or of wall, runs.
+
+    A rule without windows is all wall, and all of it is returned.
+    """
+    own = resized_rule(rule, size)
+    if not own.insertable:
+        return 0.0, size
+    widths = np.empty(2 * len(own.insertable) + 1)
+    widths[::2], widths[1::2] = own.scalable, own.insertable
+    starts = np.concatenate([[0.0], np.cumsum(widths)[:-1]])
+    first = 1 if windows else 0
+    index = first + 2 * int(np.argmax(widths[first::2]))
+    rest = WITHIN * widths[index]
+    return float(starts[index] + rest), float(starts[index] + widths[index] - rest)

@@ -1,0 +1,87 @@
+"""Retargeted buildings keep their roofs, gables, porches and chimneys."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from judges import khronos_issues
+from test_stylization import BOX, style_of
+
+from facade_tools.artifacts.building import Box, Building, Chimney, Frame, Roof
+from facade_tools.formats import gltf
+from facade_tools.stylization.bases import building_blocks
+from facade_tools.stylization.pitched import crowned, plain_wall
+from facade_tools.stylization.retarget import RAISED, retarget
+
+
+@pytest.fixture(scope="module")
+def style():
+    return style_of(BOX)
+
+
+def house(roof, height=6.0, **more):
+    return Building("house", (Box("a", "general", 0, 0, 12, 8, height, roof),), **more)
+
+
+def dressed(style, building):
+    return crowned(retarget(style, building_blocks(building)), style, building)
+
+
+def parts(scene, name):
+    return [mesh for mesh in scene.meshes if mesh.name.startswith(name)]
+
+
+def area(mesh):
+    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()) / 2
+
+
+@settings(deadline=None, max_examples=15)
+@given(pitch=st.floats(15, 60), height=st.floats(3, 9))
+def test_gables_fill_the_triangles_between_eaves_and_ridge(style, pitch, height):
+    building = house(Roof("gable", pitch, "x"), height)
+    (gables,) = parts(dressed(style, building), "gables")
+    assert area(gables) == pytest.approx(8 * 4 * math.tan(math.radians(pitch)), rel=1e-3)
+    assert gables.vertices[:, 2].min() == pytest.approx(height, abs=2e-4)
+    assert np.allclose(np.abs(gables.vertices[:, 0]), 6 + RAISED, atol=1e-5)
+
+
+def test_a_flat_house_keeps_the_roof_of_the_style(style):
+    scene = dressed(style, house(Roof("flat")))
+    assert not parts(scene, "gables")
+    assert {mesh.name for mesh in parts(scene, "roof")} == set()
+    assert any(mesh.name.endswith("/roof") for mesh in scene.meshes)
+
+
+def test_porches_and_chimneys_stand_where_the_building_has_them(style):
+    boxes = (*house(Roof("hip", 30)).boxes, Box("p", "porch", 0, -5, 4, 2, 2.6, Roof("flat")))
+    building = Building("house", boxes, chimneys=(Chimney(1.0, 1.0, 0.6, 0.6, 10.0),))
+    scene = dressed(style, building)
+    porch = np.concatenate([mesh.vertices for mesh in parts(scene, "porch")])
+    stack = np.concatenate([mesh.vertices for mesh in parts(scene, "chimney")])
+    assert porch[:, 1].min() < -5.5
+    assert stack[:, 2].max() >= 10.0
+
+
+def test_the_roof_turns_with_the_building(style):
+    plain = house(Roof("gable", 30, "x"))
+    placed = house(Roof("gable", 30, "x"), frame=Frame(rotation=90.0, shift=(100.0, 50.0, 0.0)))
+    before, after = (parts(dressed(style, b), "gables")[0].vertices for b in (plain, placed))
+    assert np.allclose(np.abs(after[:, 1] - 50.0), np.abs(before[:, 0]))
+
+
+def test_the_plain_wall_repeats_without_seams(style):
+    picture, (width, height) = plain_wall(style)
+    assert np.array_equal(picture[:, 0], picture[:, -1])
+    assert np.array_equal(picture[0], picture[-1])
+    assert min(width, height) > 0
+    assert picture.reshape(-1, 3).std(axis=0).max() < 12  # no window in it
+
+
+def test_the_validator_finds_nothing(style):
+    issues = khronos_issues(gltf.write([dressed(style, house(Roof("gable", 40, "y")))], "x"))
+    assert (issues["numErrors"], issues["numWarnings"]) == (0, 0), issues["messages"][:3]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -19,29 +19,31 @@ from facade_tools.reconstruction.expressions import number
 from facade_tools.reconstruction.library import Loaded, builtin_names, load
 from facade_tools.reconstruction.records import derivation_of
 
-from ._lots import Plot, plots
+from ._items import each
+from ._lots import Ground, grounds
 from ._models import Made, Wanted, wanted, write_models
+from ._options import StreamOptions
 from ._stream import side_input
 
 NAME = "derive"
 
 
-def run_derive(grammar: str, output: str | None, seed: int, values: Mapping[str, Any]) -> None:
+def run_derive(grammar: str, stream: StreamOptions, values: Mapping[str, Any]) -> None:
     """Derive all buildings and write them."""
     footprint, given = values["footprint"], dict(map(_value, values["given"]))
     sources = (
         *(side_input(grammar) if grammar not in builtin_names() else ()),
-        *side_input(footprint),
+        *(side_input(footprint) if footprint != "-" else ()),
     )
     recorded = {"grammar": Path(grammar).name, "set": given, "n": values["count"]}
     if footprint is not None:
         recorded["metres"] = values["metres"]
+    seed = stream.seed or 0
     provenance = Provenance(NAME, seed, recorded, sources)
-    maker = _Maker(load(grammar), given, seed, provenance, wanted(output, values["tree"]))
-    grounds: list[Plot | None] = [None]
-    if footprint is not None:
-        grounds = list(plots(footprint, values["metres"]))
-    write_models(maker.all(grounds, values["count"]), output, values["tree"])
+    made = wanted(stream.output, values["tree"])
+    maker = Maker(load(grammar), given, seed, provenance, made)
+    tasks = _tasks(maker, values)
+    write_models(each(NAME, maker, stream, tasks), stream.output, values["tree"])
 
 
 def _value(text: str) -> tuple[str, float]:
@@ -53,8 +55,16 @@ def _value(text: str) -> tuple[str, float]:
 
 
 @dataclass(frozen=True)
-class _Maker:
-    """Derives buildings, each with a generator of its own."""
+class Task:
+    """A building to derive: its id, and the ground that it stands on unless it is the lot."""
+
+    id: str
+    ground: Ground | None
+
+
+@dataclass(frozen=True)
+class Maker:
+    """Derives buildings in any process, each with a generator of its own."""
 
     loaded: Loaded
     given: Mapping[str, float]
@@ -62,14 +72,10 @@ class _Maker:
     provenance: Provenance
     wanted: Wanted
 
-    def all(self, grounds: list[Plot | None], count: int) -> Iterator[Made]:
-        for plot in grounds:
-            stem = f"{self.loaded.grammar.id}-{self.seed}" if plot is None else plot.id
-            for index in range(count):
-                yield self.one(plot, stem if count == 1 else f"{stem}-{index}")
-
-    def one(self, plot: Plot | None, identity: str) -> Made:
-        grammar, rng = self.loaded.grammar, item_generator(self.seed, NAME, identity)
+    def __call__(self, task: Task) -> Made:
+        """Return what is wanted of one building; raises InvalidInput with the rule's line."""
+        plot = None if task.ground is None else task.ground.taken()
+        grammar, rng = self.loaded.grammar, item_generator(self.seed, NAME, task.id)
         lots = [] if plot is None else [Lot(rings, height) for rings, height in plot.lots]
         frame = None if plot is None else plot.frame
         building = scene = tree = None
@@ -77,13 +83,27 @@ class _Maker:
             derived = derive(grammar, lots, rng=rng, given=self.given)
             if self.wanted.building:
                 storey = number(grammar.storey_height, derived.parameters, rng)
-                building = derived_building(derived, identity, storey)
+                building = derived_building(derived, task.id, storey)
                 building = replace(building, frame=frame, provenance=self.provenance)
             if self.wanted.scene:
-                scene = derived_scene(derived, identity)
+                scene = derived_scene(derived, task.id)
             if self.wanted.tree:
-                tree = derivation_of(derived, grammar, identity)
+                tree = derivation_of(derived, grammar, task.id)
                 tree = replace(tree, frame=frame, provenance=self.provenance)
         except InvalidInput as error:
             raise self.loaded.located(error) from None
-        return Made(identity, building, scene, tree, frame)
+        return Made(task.id, building, scene, tree, frame)
+
+
+def _tasks(maker: Maker, values: Mapping[str, Any]) -> Iterator[Task]:
+    """Yield every building of every ground; a ground that is none once, for its error."""
+    path, count = values["footprint"], values["count"]
+    found: Iterable[Ground | None] = [None] if path is None else grounds(path, values["metres"])
+    for ground in found:
+        if ground is not None and ground.plot is None:
+            yield Task("", ground)
+            continue
+        lot = f"{maker.loaded.grammar.id}-{maker.seed}"
+        stem = lot if ground is None else ground.taken().id
+        for index in range(count):
+            yield Task(stem if count == 1 else f"{stem}-{index}", ground)

@@ -12,7 +12,7 @@ from shapely.geometry.base import BaseGeometry
 
 from facade_tools.artifacts.building import Building, Frame, Roof
 from facade_tools.artifacts.footprint import Footprint
-from facade_tools.artifacts.store import read_raw
+from facade_tools.artifacts.store import RawItem, read_raw
 from facade_tools.errors import InvalidInput, Place
 from facade_tools.formats.importing import items
 from facade_tools.formats.reading import BY_NAME, ReadOptions
@@ -33,34 +33,81 @@ class Plot:
 
 def plots(path: str, metres: bool = False) -> Iterator[Plot]:
     """Yield the plots of a file. Raises InvalidInput where it holds none."""
+    for ground in grounds(path, metres):
+        yield ground.taken()
+
+
+@dataclass(frozen=True)
+class Ground:
+    """A plot, or why it is none."""
+
+    plot: Plot | None = None
+    error: InvalidInput | None = None
+
+    def taken(self) -> Plot:
+        """Return the plot; raises the error."""
+        if self.error is not None:
+            raise self.error
+        assert self.plot is not None
+        return self.plot
+
+
+def grounds(path: str, metres: bool = False) -> Iterator[Ground]:
+    """Yield the plots of a file and, in their places, what is wrong with the bad ones.
+
+    Raises InvalidInput where it holds none.
+    """
     found = False
-    for artifact in artifacts_of(path, metres):
+    for artifact in _records(path, metres):
         found = True
-        yield _of_building(artifact) if isinstance(artifact, Building) else _of_footprint(artifact)
+        try:
+            yield Ground(_plot(artifact))
+        except InvalidInput as error:
+            yield Ground(error=error.at(path))
     if not found:
         raise InvalidInput("holds no polygon of a building").at(path)
 
 
+def _plot(artifact: Footprint | Building | RawItem | InvalidInput) -> Plot:
+    if isinstance(artifact, InvalidInput):
+        raise artifact
+    if isinstance(artifact, RawItem):
+        return _plot(artifact.artifact("footprint", "building"))
+    return _of_building(artifact) if isinstance(artifact, Building) else _of_footprint(artifact)
+
+
 def artifacts_of(path: str, metres: bool) -> Iterator[Footprint | Building]:
     """Yield the footprints and buildings of a file, GeoJSON or artifacts."""
-    if Path(path).suffix.lower() in GEOJSON or _is_geojson(path):
-        options = ReadOptions(kind="footprints", metres=metres)
-        for item in items([path], options):
-            if item.error is not None or item.format is None or item.record is None:
-                raise item.error or InvalidInput("cannot be read").at(path)
-            try:
-                built = item.format.build(item.record, options).artifacts
-            except InvalidInput as error:
-                place = Place(path, item.record.line, item.record.pointer or error.place.pointer)
-                raise InvalidInput(error.message, place) from None
-            for artifact in built:
-                if isinstance(artifact, Footprint):
-                    stem = Path(path).name.split(".")[0]
-                    name = f"{stem}{artifact.id.removeprefix(BY_NAME)}"
-                    yield replace(artifact, id=name) if BY_NAME in artifact.id[:1] else artifact
+    for record in _records(path, metres):
+        if isinstance(record, InvalidInput):
+            raise record
+        yield (record.artifact("footprint", "building") if isinstance(record, RawItem) else record)
+
+
+def _records(path: str, metres: bool) -> Iterator[Footprint | RawItem | InvalidInput]:
+    if Path(path).suffix.lower() not in GEOJSON and not _is_geojson(path):
+        yield from read_raw([path])
         return
-    for raw in read_raw([path]):
-        yield raw.artifact("footprint", "building")
+    options = ReadOptions(kind="footprints", metres=metres)
+    for item in items([path], options):
+        if item.error is not None or item.format is None or item.record is None:
+            yield item.error or InvalidInput("cannot be read").at(path)
+            continue
+        try:
+            built = item.format.build(item.record, options).artifacts
+        except InvalidInput as error:
+            place = Place(path, item.record.line, item.record.pointer or error.place.pointer)
+            yield InvalidInput(error.message, place)
+            continue
+        yield from (_named(row, path) for row in built if isinstance(row, Footprint))
+
+
+def _named(artifact: Footprint, path: str) -> Footprint:
+    """Return a footprint that its file names, where it has no name of its own."""
+    if BY_NAME not in artifact.id[:1]:
+        return artifact
+    name = artifact.id.removeprefix(BY_NAME)
+    return replace(artifact, id=f"{Path(path).name.split('.')[0]}{name}")
 
 
 def _is_geojson(path: str) -> bool:

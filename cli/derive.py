@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import click
 
 from . import _options
@@ -22,7 +24,10 @@ from . import _options
               help="A parameter's value instead of the grammar's own (repeatable).")  # fmt: skip
 @click.option("--tree", metavar="FILE", help="The derivations too: .json, .jsonl or a folder.")
 @_options.seed
-def command(grammar: str, output: str | None, seed: int, **values: object) -> None:
+@_options.jobs
+@_options.scheduler
+@_options.on_error
+def command(grammar: str, **values: Any) -> None:
     """Turn footprints into buildings by a shape grammar (KSTTP09 section 2).
 
     GRAMMAR is the name of a shipped grammar (ksttp09, haussmann, victorian, modern) or a YAML
@@ -34,4 +39,6 @@ def command(grammar: str, output: str | None, seed: int, **values: object) -> No
     """
     from ._deriving import run_derive
 
-    run_derive(grammar, output, seed, values)
+    names = ("output", "seed", "jobs", "scheduler", "on_error")
+    stream = _options.StreamOptions(inputs=(), **{name: values.pop(name) for name in names})
+    run_derive(grammar, stream, values)

@@ -443,3 +443,25 @@ def test_parameters_are_set(facade_here, tmp_path):
     assert b"has h0, h, hb" in wrong.stderr
     assert facade_here("derive", "nowhere").returncode == 3
     assert facade_here("derive", "ksttp09", "-o", tmp_path / "k.stl").returncode == 2
+
+
+def test_bad_footprints_are_skipped_and_jobs_change_nothing(facade_here, tmp_path):
+    def square(name, side):
+        ring = [[0, 0], [side, 0], [side, 9], [0, 9]]
+        return {"schema": "facade-tools/footprint/1", "id": name, "height": 9, "polygon": [ring]}
+
+    rows = [square("one", 12), square("thin", 0.2), square("two", 14)]
+    rows.append({**square("line", 5), "polygon": [[[0, 0], [5, 0], [5, 0]]]})
+    lots = tmp_path / "lots.jsonl"
+    lots.write_text("".join(json.dumps(row) + "\n" for row in rows))
+    base = ("derive", "haussmann", "--footprint", lots)
+    stopped = facade_here(*base, "-o", tmp_path / "none.jsonl")
+    assert stopped.returncode == 3
+    assert not (tmp_path / "none.jsonl").exists()
+    one = facade_here(*base, "-n", 2, "--on-error", "skip", "--jobs", 1)
+    many = facade_here(*base, "-n", 2, "--on-error", "skip", "--jobs", 2)
+    assert one.returncode == many.returncode == 3
+    assert one.stdout == many.stdout
+    ids = [json.loads(line)["id"] for line in one.stdout.splitlines()]
+    assert ids == ["one-0", "one-1", "two-0", "two-1"]
+    assert b"skipped" in one.stderr

@@ -20,6 +20,7 @@ from facade_tools.artifacts.layout import Layout, LayoutShape
 from facade_tools.formats.mesh_reader import read_textured
 from facade_tools.formats.style_folder import write_style
 from facade_tools.formats.textured import joined
+from facade_tools.imaging.image_io import decoded
 from facade_tools.stylization.bases import layout_blocks, with_ends
 from facade_tools.stylization.capture import capture_style
 from facade_tools.stylization.drawing import sheet_picture
@@ -353,3 +354,35 @@ def test_samples_are_made_again_byte_for_byte(tmp_path):
     kept = {p.relative_to(SAMPLES): p.read_bytes() for p in SAMPLES.rglob("*") if p.is_file()}
     assert made == kept
     assert sum(len(data) for data in kept.values()) < 1_000_000
+
+
+OUTWARDS = {"front": (0, -1), "right": (1, 0), "back": (0, 1), "left": (-1, 0)}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_walls_face_outwards(styles, name):
+    for mesh in retarget(styles[name], replace(styles[name].blocks, frame=None)).meshes:
+        side = mesh.name.split("/")[1] if "/" in mesh.name else ""
+        if side in OUTWARDS:
+            a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+            normals = np.cross(b - a, c - a)[:, :2]
+            assert (normals @ np.array(OUTWARDS[side]) > 0).all()
+
+
+def test_what_no_page_can_hold_goes_on_several_in_full_resolution(styles, monkeypatch):
+    style = styles["l-block"]
+    whole = retarget(style, style.blocks)
+    for module in ("atlas", "retarget"):
+        monkeypatch.setattr(f"facade_tools.stylization.{module}.LARGEST_PAGE", 256)
+    monkeypatch.setattr("facade_tools.stylization.atlas.USUAL_HEIGHT", 256)
+    tiled = retarget(style, style.blocks)
+    areas = [sum(wall_area(mesh) for mesh in s.meshes if "/" in mesh.name) for s in (whole, tiled)]
+    assert areas[0] == pytest.approx(areas[1])
+    assert sum(name.startswith("atlas") for name in tiled.materials) > 4
+    for mesh in (m for m in tiled.meshes if m.material.startswith("atlas")):
+        page = decoded(tiled.materials[mesh.material].texture, "page")
+        assert max(page.shape) <= 256
+        texels = mesh.uv[mesh.faces] * np.array(page.shape[1::-1])
+        (ux, uy), (vx, vy) = (np.moveaxis(texels[:, k] - texels[:, 0], -1, 0) for k in (1, 2))
+        share = 0.5 * np.abs(ux * vy - uy * vx).sum() / wall_area(mesh)
+        assert share == pytest.approx((2 * style.sheet.resolution) ** 2, rel=0.05)

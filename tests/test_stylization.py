@@ -14,7 +14,7 @@ from facade_tools.artifacts.building import Box, Building, Roof
 from facade_tools.errors import InvalidInput
 from facade_tools.formats.mesh_reader import read_textured
 from facade_tools.formats.textured import Paint, TexturedMesh
-from facade_tools.stylization.atlas import packed
+from facade_tools.stylization.atlas import painted, planned
 from facade_tools.stylization.bases import building_blocks
 from facade_tools.stylization.capture import capture_style
 from facade_tools.stylization.framing import standard_view
@@ -240,9 +240,10 @@ def test_building_boxes_become_disjoint_blocks():
 @given(st.lists(st.tuples(st.integers(1, 60), st.integers(1, 60)), max_size=12))
 def test_an_atlas_holds_every_picture_unharmed(sizes):
     pictures = [np.full((h, w, 3), 20 * i + 5, dtype=np.uint8) for i, (h, w) in enumerate(sizes)]
-    atlas = packed(pictures)
+    atlas = planned([picture.shape[:2] for picture in pictures])
+    pages = [painted(atlas, k, pictures.__getitem__) for k in range(len(atlas.sheets))]
     for i, picture in enumerate(pictures):
-        page = atlas.pages[atlas.page[i]]
+        page = pages[atlas.page[i]]
         h, w = page.shape[:2]
         x0, y0, x1, y1 = atlas.rectangles[i]
         cut = page[round((1 - y1) * h) : round((1 - y0) * h), round(x0 * w) : round(x1 * w)]

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
 from ..errors import Infeasible
-from ..geometry.arrays import Floats
+from ..geometry.arrays import Floats, Integers
 from ..imaging.image_io import Picture
 
 PADDING = 8  # pixels of the border's own colour around every picture: three mip levels
@@ -20,37 +20,57 @@ QUALITY = 95  # of JPEG
 
 @dataclass(frozen=True, slots=True)
 class Atlas:
-    """Pages as pictures, and for every input its page and uv rectangle.
+    """Where pictures stand: of every page its height and width, of every picture its place.
 
-    rectangles (n, 4): left, bottom, right, top, origin at the page's lower left.
+    corners (n, 2): row and column of a picture's first pixel on its page. rectangles (n, 4): left,
+    bottom, right, top, origin at the page's lower left.
     """
 
-    pages: tuple[Picture, ...]
+    sheets: tuple[tuple[int, int], ...]
     page: tuple[int, ...]
+    corners: Integers
     rectangles: Floats
 
 
-def packed(pictures: Sequence[Picture]) -> Atlas:
-    """Place pictures on shelves, highest first. Raises Infeasible for one larger than a page."""
-    sizes = np.array([p.shape[:2] for p in pictures], dtype=np.int64).reshape(-1, 2) + 2 * PADDING
+def planned(shapes: Sequence[tuple[int, int]]) -> Atlas:
+    """Place pictures of given heights and widths (pixels) on shelves, highest first.
+
+    Raises Infeasible for one larger than a page.
+    """
+    sizes = np.array(shapes, dtype=np.int64).reshape(-1, 2) + 2 * PADDING
     if len(sizes) and sizes.max() > LARGEST_PAGE:
         raise Infeasible(f"a texture of {sizes.max()} pixels does not fit {LARGEST_PAGE}")
     width = _page_width(sizes)
     page, corner, heights = _shelves(sizes, width)
-    pages = [np.zeros((height, width, 3), dtype=np.uint8) for height in heights]
-    rectangles = np.empty((len(pictures), 4))
-    for i, picture in enumerate(pictures):
-        x, y = corner[i]
-        rows, columns = sizes[i]
-        sheet = pages[page[i]]
-        edge = cv2.BORDER_REPLICATE
-        bordered = cv2.copyMakeBorder(picture, PADDING, PADDING, PADDING, PADDING, edge)
-        sheet[y : y + rows, x : x + columns] = bordered
-        box = (x + PADDING, y + rows - PADDING, x + columns - PADDING, y + PADDING)
-        scale = (width, sheet.shape[0]) * 2
-        left, bottom, right, top = (b / s for b, s in zip(box, scale, strict=True))
-        rectangles[i] = left, 1 - bottom, right, 1 - top
-    return Atlas(tuple(pages), tuple(page), rectangles)
+    corners = np.array(corner, dtype=np.int64).reshape(-1, 2)[:, ::-1] + PADDING
+    ends = corners + sizes - 2 * PADDING
+    height = np.array(heights)[np.array(page, dtype=np.int64)]
+    rectangles = np.stack(
+        [
+            corners[:, 1] / width,
+            1 - ends[:, 0] / height,
+            ends[:, 1] / width,
+            1 - corners[:, 0] / height,
+        ],
+        axis=1,
+    )
+    return Atlas(tuple((h, width) for h in heights), tuple(page), corners, rectangles)
+
+
+def painted(atlas: Atlas, number: int, draw: Callable[[int], Picture]) -> Picture:
+    """Return a page; draw: gives the picture of an index. One page is in memory at a time."""
+    sheet = np.zeros((*atlas.sheets[number], 3), dtype=np.uint8)
+    for i in (i for i, page in enumerate(atlas.page) if page == number):
+        picture = draw(i)
+        (top, left), (rows, columns) = atlas.corners[i].tolist(), picture.shape[:2]
+        bottom, right = top + rows, left + columns
+        sheet[top:bottom, left:right] = picture
+        sheet[top:bottom, left - PADDING : left] = picture[:, :1]
+        sheet[top:bottom, right : right + PADDING] = picture[:, -1:]
+        whole = sheet[:, left - PADDING : right + PADDING]
+        whole[top - PADDING : top] = whole[top]
+        whole[bottom : bottom + PADDING] = whole[bottom - 1]
+    return sheet
 
 
 def _page_width(sizes: np.ndarray) -> int:
@@ -80,10 +100,10 @@ def _shelves(sizes: np.ndarray, width: int) -> tuple[list[int], list[tuple[int, 
 
 
 def encoded_page(page: Picture) -> bytes:
-    """Return a page as JPEG (quality 95, no chroma subsampling)."""
+    """Return a page as JPEG, its colour at half the resolution: an atlas is twice as fine."""
     flags = [cv2.IMWRITE_JPEG_QUALITY, QUALITY]
-    flags += [cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444]
-    done, data = cv2.imencode(".jpg", page[:, :, ::-1], flags)
+    flags += [cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_420]
+    done, data = cv2.imencode(".jpg", cv2.cvtColor(page, cv2.COLOR_RGB2BGR), flags)
     if not done:
         raise RuntimeError("JPEG encoding failed")
     return data.tobytes()

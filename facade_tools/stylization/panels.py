@@ -75,7 +75,7 @@ def _panel(
 
 def _seen(panel: Panel, others: Sequence[Slab]) -> Floats:
     """Return the rectangles (k, 4) of a panel that no other block's slab covers, in shares."""
-    along, direction, depth, sign = SIDES[panel.side]
+    along, _, depth, sign = SIDES[panel.side]
     (left, right), place = panel.corners[:2, along], panel.corners[0, depth] + sign * 1e-4
     bottom, top = panel.corners[0, 2], panel.corners[2, 2]
     low, high = sorted((float(left), float(right)))
@@ -100,7 +100,7 @@ def _seen(panel: Panel, others: Sequence[Slab]) -> Floats:
     vs = (vs - bottom) / (top - bottom)
     boxes = [(us[a], vs[r], us[b], vs[q]) for r, q, a, b in rectangles(~hidden)]
     seen = np.array(boxes).reshape(-1, 4)
-    return seen if direction * (right - left) > 0 else seen[:, [2, 1, 0, 3]]
+    return seen if right > left else seen[:, [2, 1, 0, 3]]
 
 
 def _stretches(

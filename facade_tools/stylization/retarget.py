@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -13,16 +14,16 @@ from ..artifacts.stylesheet import StyleSheet
 from ..geometry.arrays import Floats
 from ..geometry.mesh import Material, Mesh, Scene
 from ..imaging.image_io import Picture
-from .atlas import LARGEST_PAGE, PADDING, Atlas, encoded_page, packed
+from .atlas import LARGEST_PAGE, PADDING, Atlas, encoded_page, painted, planned
 from .hull import layers, mass, roofs
 from .panels import SMALL, Panel, panels, reassigned
 from .placing import Placed, foreign_blocks, placed_blocks, placed_slabs
 from .projection import SIDES
 from .remesh import Slab
-from .synthesis import synthesised
+from .synthesis import Part, shape_of, synthesised
 
 FINER = 2.0  # resolution of the atlas over the source's textures
-MAX_ATLAS_PIXELS = 48_000_000
+MAX_ATLAS_PIXELS = 400_000_000  # of all pages together; one is in memory at a time
 RAISED = 0.005  # m: textured faces stand before the closed solid by this much
 
 
@@ -70,11 +71,9 @@ def _mean_colour(style: Style, found: Sequence[Panel]) -> str:
 
 
 # --- walls ----------------------------------------------------------------------------------------
-def _density(sheet: StyleSheet, areas: float, longest: float) -> float:
+def _density(sheet: StyleSheet, areas: float) -> float:
     """Return the resolution of the atlas (pixels a metre): twice the source's, or what fits."""
-    fits = min(
-        math.sqrt(MAX_ATLAS_PIXELS / max(areas, 1e-9)), (LARGEST_PAGE - 4 * PADDING) / longest
-    )
+    fits = math.sqrt(MAX_ATLAS_PIXELS / max(areas, 1e-9))
     return min(FINER * (sheet.resolution or sheet.density), fits)
 
 
@@ -87,44 +86,62 @@ def _key(panel: Panel) -> Key:
     return panel.texture, panel.source, (round(width, 6), round(height, 6))
 
 
+def _tiles(panel: Panel, density: float) -> list[Part]:
+    """Return the parts of a panel's picture, of which each fits a page."""
+    columns, rows = (
+        np.linspace(0, 1, 1 + math.ceil((size * density + 1) / (LARGEST_PAGE - 2 * PADDING)))
+        for size in panel.target
+    )
+    return [(u, v) for u in pairwise(columns.tolist()) for v in pairwise(rows.tolist())]
+
+
 def _textured(
     style: Style, placed: Sequence[Placed], found: Sequence[Panel]
 ) -> tuple[list[Mesh], dict[str, Material]]:
     distinct = {_key(panel): panel for panel in reversed(found)}
-    index = {key: i for i, key in enumerate(distinct)}
     areas = math.fsum(p.target[0] * p.target[1] for p in distinct.values())
-    longest = max((max(p.target) for p in distinct.values()), default=1.0)
-    density = _density(style.sheet, areas, longest)
-    atlas = packed(
-        [
-            synthesised(style.pictures[p.texture], p.rules, p.source, p.target, density)
-            for p in distinct.values()
-        ]
-    )
+    density = _density(style.sheet, areas)
+    tiles = {key: _tiles(panel, density) for key, panel in distinct.items()}
+    pictures = [(key, part) for key, parts in tiles.items() for part in parts]
+    atlas = planned([shape_of(distinct[key].target, density, part) for key, part in pictures])
+
+    def drawn(number: int) -> Picture:
+        key, part = pictures[number]
+        p = distinct[key]
+        return synthesised(style.pictures[p.texture], p.rules, p.source, p.target, density, part)
+
     materials = {
-        f"atlas-{i}": Material(f"atlas-{i}", "#ffffff", texture=encoded_page(page))
-        for i, page in enumerate(atlas.pages)
+        f"atlas-{i}": Material(
+            f"atlas-{i}", "#ffffff", texture=encoded_page(painted(atlas, i, drawn))
+        )
+        for i in range(len(atlas.sheets))
     }
-    parts: dict[tuple[str, int], list[Panel]] = {}
+    index = {picture: i for i, picture in enumerate(pictures)}
+    walls: dict[tuple[str, int], list[tuple[Panel, int, Part]]] = {}
     for panel in found:
         name = f"{placed[panel.block].target.id}/{panel.side}"
-        parts.setdefault((name, atlas.page[index[_key(panel)]]), []).append(panel)
+        for part in tiles[_key(panel)]:
+            number = index[_key(panel), part]
+            walls.setdefault((name, atlas.page[number]), []).append((panel, number, part))
     meshes = [
-        _wall(name if page == 0 else f"{name}/{page}", page, members, atlas, index)
-        for (name, page), members in parts.items()
+        _wall(name if page == 0 else f"{name}/{page}", page, members, atlas)
+        for (name, page), members in walls.items()
     ]
     return meshes, materials
 
 
-def _wall(
-    name: str, page: int, members: Sequence[Panel], atlas: Atlas, index: Mapping[Key, int]
-) -> Mesh:
+def _wall(name: str, page: int, members: Sequence[tuple[Panel, int, Part]], atlas: Atlas) -> Mesh:
     corners, uv = [], []
-    for panel in members:
-        box = atlas.rectangles[index[_key(panel)]]
+    for panel, number, ((left, right), (top, bottom)) in members:
+        box = atlas.rectangles[number]
+        low, high = np.array([left, 1 - bottom]), np.array([right, 1 - top])
         for seen in panel.seen:
-            corners.append(_cut(panel, seen))
-            uv.append(box[:2] + seen.reshape(2, 2) * (box[2:] - box[:2]))
+            ends = np.clip(seen.reshape(2, 2), low, high)
+            if (ends[0] < ends[1]).all():
+                corners.append(_cut(panel, ends.ravel()))
+                uv.append(box[:2] + (ends - low) / (high - low) * (box[2:] - box[:2]))
+    if not corners:
+        return Mesh(name, np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64), f"atlas-{page}")
     ends = np.array(uv)  # (k, 2, 2): lower left, upper right
     square = ends[:, [[0, 0], [1, 0], [1, 1], [0, 1]], [0, 1]].reshape(-1, 2)
     return Mesh(name, np.concatenate(corners), _quads(len(corners)), f"atlas-{page}", square)

@@ -6,13 +6,18 @@ import math
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
+from ..compiled import compiled
 from ..geometry.arrays import Floats, Integers
 from ..imaging.image_io import Picture
 from .splitting import Split, SplitRule, split
 
 CLEAR = 0.2  # of a wall beside windows, that a face without windows leaves out at either end
 SMEARED = 2.0  # stretch of walls beyond which their texture repeats
+Part = tuple[tuple[float, float], tuple[float, float]]  # shares: left and right, top and bottom
+WHOLE: Part = ((0.0, 1.0), (0.0, 1.0))
+Singles = NDArray[np.float32]
 
 
 def resized_rule(rule: SplitRule, size: float) -> SplitRule:
@@ -67,22 +72,68 @@ def synthesised(
     source: tuple[float, float],
     target: tuple[float, float],
     density: float,
+    part: Part = WHOLE,
 ) -> Picture:
     """Return the picture of a resized face.
 
     rules: for columns (left to right) and for rows (top to bottom). source, target: width and
-    height (m) before and after. density: pixels a metre of the result.
+    height (m) before and after. density: pixels a metre of the result. part: what is wanted of it.
     """
-    columns, rows = (max(1, round(size * density)) for size in target)
-    x = positions(rules[0], source[0], target[0], columns) * picture.shape[1] - 0.5
-    y = positions(rules[1], source[1], target[1], rows) * picture.shape[0] - 0.5
-    map_x = np.broadcast_to(x.astype(np.float32), (rows, columns))
-    map_y = np.broadcast_to(y.astype(np.float32)[:, None], (rows, columns))
-    mapped = cv2.remap(
-        picture,
-        np.ascontiguousarray(map_x),
-        np.ascontiguousarray(map_y),
-        cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_REPLICATE,
+    places = [
+        positions(rule, old, new, _pixels(new, density)) * size - 0.5
+        for rule, old, new, size in zip(rules, source, target, picture.shape[1::-1], strict=True)
+    ]
+    columns, rows = (p[_cut(*ends, len(p))] for p, ends in zip(places, part, strict=True))
+    order = ((rows, 0), (columns, 1)) if len(rows) < picture.shape[0] else ((columns, 1), (rows, 0))
+    for line, axis in order:  # first the one that leaves less to the other
+        picture = _resampled(picture, line, axis)
+    return picture
+
+
+def shape_of(target: tuple[float, float], density: float, part: Part = WHOLE) -> tuple[int, int]:
+    """Return height and width (pixels) of what `synthesised` draws."""
+    columns, rows = (
+        len(range(*_cut(*ends, _pixels(size, density)).indices(_pixels(size, density))))
+        for size, ends in zip(target, part, strict=True)
     )
-    return np.asarray(mapped, dtype=np.uint8).reshape(rows, columns, 3)
+    return rows, columns
+
+
+def _pixels(size: float, density: float) -> int:
+    return max(1, round(size * density))
+
+
+def _cut(first: float, last: float, pixels: int) -> slice:
+    return slice(round(first * pixels), round(last * pixels))
+
+
+def _resampled(picture: Picture, places: Floats, axis: int) -> Picture:
+    """Return a picture whose pixels along an axis are those at `places` (pixels) of the old."""
+    size = picture.shape[axis]
+    rows, columns = (len(places) if k == axis else picture.shape[k] for k in (0, 1))
+    even = (np.arange(len(places)) + 0.5) * (size / len(places)) - 0.5
+    if np.abs(places - even).max() < 1e-3:
+        if len(places) == size:
+            return picture
+        found = cv2.resize(picture, (columns, rows), interpolation=cv2.INTER_LINEAR)
+        return np.asarray(found, dtype=np.uint8).reshape(rows, columns, 3)
+    low = np.clip(np.floor(places), 0, size - 1).astype(np.int64)
+    share = np.clip(places - low, 0, 1).astype(np.float32)
+    return np.asarray(_blended(picture, low, share, axis))
+
+
+@compiled
+def _blended(picture: Picture, low: Integers, share: Singles, axis: int) -> Picture:
+    """Mix every place with the next one by a share; the last one stays itself."""
+    h, w = picture.shape[0], picture.shape[1]
+    out = np.empty((len(low) if axis == 0 else h, len(low) if axis == 1 else w, 3), np.uint8)
+    for row in range(out.shape[0]):
+        for column in range(out.shape[1]):
+            k = row if axis == 0 else column
+            first, weight = low[k], int(share[k] * 256 + 0.5)
+            last = min(first + 1, (h if axis == 0 else w) - 1)
+            for c in range(3):
+                a = int(picture[first, column, c] if axis == 0 else picture[row, first, c])
+                b = int(picture[last, column, c] if axis == 0 else picture[row, last, c])
+                out[row, column, c] = (a * (256 - weight) + b * weight + 128) >> 8
+    return out

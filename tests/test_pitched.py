@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from judges import khronos_issues
@@ -13,6 +14,7 @@ from test_stylization import BOX, style_of
 
 from facade_tools.artifacts.building import Box, Building, Chimney, Frame, Roof
 from facade_tools.formats import gltf
+from facade_tools.geometry.solids import building_solid, triangulated
 from facade_tools.stylization.bases import building_blocks
 from facade_tools.stylization.pitched import crowned, plain_wall
 from facade_tools.stylization.retarget import RAISED, retarget
@@ -65,6 +67,23 @@ def test_porches_and_chimneys_stand_where_the_building_has_them(style):
     stack = np.concatenate([mesh.vertices for mesh in parts(scene, "chimney")])
     assert porch[:, 1].min() < -5.5
     assert stack[:, 2].max() >= 10.0
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_the_mass_is_one_closed_solid_with_its_roof(style, turned):
+    boxes = (
+        *house(Roof("gable", 45, "x")).boxes,
+        Box("b", "general", 4, 5, 6, 6, 4.0, Roof("hip", 30, "y")),
+        Box("g", "garage", -9, 0, 6, 6, 2.8, Roof("flat")),
+    )
+    frame = Frame(rotation=30.0, shift=(400.0, 50.0, 10.0)) if turned else None
+    building = Building("house", boxes, frame=frame)
+    (mass,) = parts(dressed(style, building), "mass")
+    solid = trimesh.Trimesh(mass.vertices, mass.faces, process=False)
+    vertices, triangles, _ = triangulated(building_solid(building))
+    whole = trimesh.Trimesh(vertices, triangles, process=False)
+    assert solid.is_volume
+    assert solid.volume == pytest.approx(whole.volume, rel=1e-5)
 
 
 def test_the_roof_turns_with_the_building(style):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,6 +22,9 @@ from .bases import frame_of
 from .retarget import RAISED, Style
 from .splitting import SplitRule
 from .synthesis import resized_rule
+
+if TYPE_CHECKING:
+    from manifold3d import Manifold
 
 WITHIN = 0.1  # of a plain section, left out at either end: lintels and sills reach into it
 SLIVER = 1e-4  # m above the eaves: what stands lower is the rounding of the solid
@@ -39,17 +43,58 @@ def crowned(scene: Scene, style: Style, building: Building) -> Scene:
     crown = crown_scene(building, solid if pitched else None)
     meshes, materials = list(crown.meshes), dict(crown.materials)
     if pitched:
+        attic = _framed(_attic(building, solid), frame_of(building))
+        scene = replace(scene, meshes=tuple(_united(mesh, attic) for mesh in scene.meshes))
         picture, size = plain_wall(style)
         meshes.append(_gables(building, solid, size))
         materials["gable"] = Material("gable", "#ffffff", texture=encoded_page(picture))
-    frame = frame_of(building)
-    if frame is not None:
-        turn = np.array(frame)
-        meshes = [replace(m, vertices=m.vertices @ turn[:3, :3].T + turn[:3, 3]) for m in meshes]
+    meshes = [_framed(mesh, frame_of(building)) for mesh in meshes]
     used = {mesh.material for mesh in meshes}
     kept = {f"own-{name}": replace(materials[name], name=f"own-{name}") for name in sorted(used)}
     own = [replace(m, material=f"own-{m.material}") for m in meshes if len(m.faces)]
     return replace(scene, meshes=(*scene.meshes, *own), materials={**scene.materials, **kept})
+
+
+# --- the closed solid -----------------------------------------------------------------------------
+def _attic(building: Building, solid: Solid) -> Mesh:
+    """Return what of the solid lies above the eaves of its boxes."""
+    from manifold3d import Manifold, OpType
+
+    walls = [
+        Manifold.cube((box.width, box.depth, (box.height or 0.0) + 1.0)).translate(
+            (box.x - box.width / 2, box.y - box.depth / 2, -1.0)
+        )
+        for box in building.boxes
+        if box.kind != "porch"
+    ]
+    vertices, triangles, _ = triangulated(solid)
+    whole = _manifold(Mesh("mass", vertices, triangles, "mass"))
+    return _mesh(Manifold.batch_boolean([whole, *walls], OpType.Subtract))
+
+
+def _united(mesh: Mesh, attic: Mesh) -> Mesh:
+    """Return the mesh `mass` with the attic on it, any other mesh as it is."""
+    if mesh.name != "mass":
+        return mesh
+    whole = _mesh((_manifold(mesh) + _manifold(attic)).simplify(SLIVER))
+    return replace(mesh, vertices=whole.vertices, faces=whole.faces)
+
+
+def _framed(mesh: Mesh, frame: tuple[tuple[float, ...], ...] | None) -> Mesh:
+    turn = np.eye(4) if frame is None else np.array(frame)
+    return replace(mesh, vertices=mesh.vertices @ turn[:3, :3].T + turn[:3, 3])
+
+
+def _mesh(solid: Manifold) -> Mesh:
+    found = solid.to_mesh64()
+    vertices = np.array(found.vert_properties, dtype=np.float64)[:, :3]
+    return Mesh("mass", vertices, np.array(found.tri_verts, dtype=np.int64), "mass")
+
+
+def _manifold(mesh: Mesh) -> Manifold:
+    from manifold3d import Manifold, Mesh64
+
+    return Manifold(Mesh64(np.ascontiguousarray(mesh.vertices), mesh.faces.astype(np.uint64)))
 
 
 # --- gables ---------------------------------------------------------------------------------------

@@ -16,13 +16,14 @@ from facade_tools.parallel import map_ordered
 
 from ._options import StreamOptions
 from ._report import Progress, say_error
-from ._stream import open_sink, write_result
+from ._stream import one_by_one, open_sink, write_result
 
 if TYPE_CHECKING:
     from facade_tools.artifacts.attributes import Attributes
     from facade_tools.artifacts.model import Model
+    from facade_tools.exteriors.sample_lines import Lines
 
-RUN = 1000  # samples that one generator draws
+RUN = 4096  # samples that one generator draws
 
 
 def item_attributes(item: RawItem) -> Attributes:
@@ -117,8 +118,8 @@ class Drawing:
             return [(0, count)]
         return [(at, min(RUN, count - at)) for at in range(0, count, RUN)] or [(0, 0)]
 
-    def __call__(self, run: tuple[int, int]) -> list[tuple[str, bytes]]:
-        """Return id and bytes of every sample of a run."""
+    def __call__(self, run: tuple[int, int]) -> list[Lines]:
+        """Return the samples of a run."""
         from facade_tools.exteriors.drawing import SampleOptions
         from facade_tools.exteriors.sample_lines import sample_lines
         from facade_tools.randomness import item_generator
@@ -148,9 +149,10 @@ def write_samples(
         for outcome in outcomes:
             if outcome.error is not None:
                 raise outcome.error
-            for identity, data in outcome.value or []:
-                write(identity, data)
-                progress.advance()
+            for lines in outcome.value or []:
+                for identity, data in lines.apart() if one_by_one(output) else [("", lines.data)]:
+                    write(identity, data)
+                progress.advance(items=lines.count)
     progress.close()
 
 

@@ -120,9 +120,9 @@ class Progress:
         self.enabled = sys.stderr.isatty() and not quiet
         self.drawn = False
 
-    def advance(self, fraction: float | None = None) -> None:
-        """Count one item more; `fraction` of all the work, where it is known."""
-        self.count += 1
+    def advance(self, fraction: float | None = None, *, items: int = 1) -> None:
+        """Count items that are done; `fraction` of all the work, where it is known."""
+        self.count += items
         now = time.monotonic()
         if self.enabled and now - self.start > PATIENCE and now - self.shown > 0.1:
             self.shown, self.drawn = now, True

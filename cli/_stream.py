@@ -132,6 +132,11 @@ def is_folder(output: str) -> bool:
     return output.endswith("/") or Path(output).is_dir() or not Path(output).suffix
 
 
+def one_by_one(output: str | None) -> bool:
+    """Tell whether an output takes artifacts one by one: a folder, or a file for a single one."""
+    return output not in (None, "-") and (is_folder(str(output)) or _single(output))
+
+
 @contextmanager
 def open_sink(output: str | None, suffix: str = ".json") -> Iterator[Write]:
     """Open what takes the results: standard output, one file, or a folder with a file an item."""

@@ -5,10 +5,11 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from facade_tools.artifacts.documents import parse_json, parse_yaml
+from facade_tools.artifacts.number_bytes import plain_size, text_of, write_number
 from facade_tools.artifacts.numbers import Given, canonical, dump_document, dump_line, parse_float
 from facade_tools.errors import InvalidInput
 
@@ -65,6 +66,43 @@ def test_numpy_values_become_plain_json():
         "e": (1, 2),
     }
     assert json.loads(dump_line(data)) == {"a": 1.5, "b": [0, 1, 2], "c": 2, "d": True, "e": [1, 2]}
+
+
+halves = st.builds(lambda odd, shift: (2 * odd + 1) / 2**shift, st.integers(0, 10**12),
+                   st.integers(1, 20))  # fmt: skip
+decimals = st.builds(lambda whole, places: whole / 10**places, st.integers(-(10**13), 10**13),
+                     st.integers(0, 20))  # fmt: skip
+
+
+@settings(deadline=None)  # the first call may compile
+@given(finite | halves | decimals | st.floats(-1e13, 1e13) | st.floats(-1e-3, 1e-3))
+@example(-0.0)
+@example(1e-05)
+@example(-1e-11)
+@example(9.9999999999995)
+@example(99999.9999999995)
+@example(999999999998.5)
+@example(999999999999.5)
+@example(123456789012.0)
+@example(1e12)
+@example(0.000123456789012501)
+def test_compiled_numbers_are_the_same_bytes(value):
+    """`write_number` where it says that it can; `text_of` writes every number."""
+    text = dump_line(value)[:-1]
+    assert text_of(value) == text
+    if plain_size(np.array(value)):
+        out = np.zeros(40, dtype=np.uint8)
+        end = write_number(value, out, 3)
+        assert out[3:end].tobytes() == text
+
+
+def test_compiled_numbers_of_every_size():
+    rng = np.random.default_rng(0)
+    sizes = 10.0 ** rng.uniform(-11, 12, 20_000) * rng.choice([-1, 1], 20_000)
+    values = np.concatenate([sizes, sizes.round(3), 10.0 ** np.arange(-11, 12), np.arange(200.0)])
+    out = np.zeros(40, dtype=np.uint8)
+    for value in values[plain_size(values)].tolist():
+        assert out[: write_number(value, out, 0)].tobytes() == text_of(value)
 
 
 def test_negative_zero_is_zero():

@@ -20,6 +20,7 @@ from facade_tools.exteriors.drawing import SampleOptions, sample_attributes
 from facade_tools.exteriors.evaluation import negative_log_density
 from facade_tools.exteriors.learning import LearnOptions, learn_model
 from facade_tools.exteriors.prior import shipped_prior
+from facade_tools.exteriors.row_bytes import Row, joined, text_column
 from facade_tools.exteriors.sample_lines import sample_lines
 from facade_tools.exteriors.serialisation import network_of
 
@@ -231,7 +232,28 @@ def test_columns_write_the_same_bytes_as_artifacts(model, options):
     found = sample_lines(
         model, 40, rng=np.random.default_rng(2), given=None, options=chosen, provenance=provenance
     )
+    found = [apart for lines in found for apart in lines.apart()]
     assert [line for _, line in found] == wanted
+    assert [identity for identity, _ in found] == [f"%-{i}" for i in range(7, 47)]
+
+
+def test_rows_with_numbers_of_any_size_are_the_same_bytes():
+    """Of numbers, texts and pieces, also numbers that the compiled loop leaves to Python."""
+    rng = np.random.default_rng(0)
+    numbers = 10.0 ** rng.uniform(-30, 30, (50, 3))
+    numbers[:5] = [[0.0, -0.0, 1e-12], [1e12, 1e16, 1e22], [1.0, 0.5, 3e-320], [2, 3, 4], [5, 6, 7]]
+    words = ("é", "", '"q"')
+    index = rng.integers(0, 3, 50)
+    row = Row(
+        (b"[", b",", b",", b",", b"]\n"), (*numbers.T[:2], text_column(words, index), numbers.T[2])
+    )
+    found = joined(row, 50).decode().splitlines()
+    for line, three, word in zip(found, numbers.tolist(), index, strict=True):
+        texts = [dump_line(x).decode()[:-1] for x in three]
+        assert line == f"[{texts[0]},{texts[1]},{words[word]},{texts[2]}]"
+    with pytest.raises(ValueError, match="cannot be written"):
+        joined(Row((b"", b""), (np.array([np.nan]),)), 1)
+    assert joined(Row((b"", b""), (np.empty(0),)), 0) == b""
 
 
 def test_shared_values_come_back(houses):

@@ -16,9 +16,10 @@ from .dataset import Masks
 from .groups import Group, least_bdry
 from .network import Network
 from .physical import Columns, settle
-from .sampling import BLOCK, Draws
+from .sampling import Draws
 from .shared_values import SharedValues, take_up
 
+BLOCK = 1024  # weighted draws of one resampling
 ATTEMPTS = 40  # blocks without one possible draw before completion gives up
 
 

@@ -6,13 +6,13 @@ import numpy as np
 
 from .coordinates import Floats, Readings
 from .dataset import Dataset, build
-from .network import Network, infer
+from .network import Network, row_log_density
 
 
 def log_density(network: Network, readings: Readings) -> Floats:
     """Return log p of each row (n,): density per metre or per unit, mass at atoms (CONTRACT 3)."""
     data = build(readings, network.layout, network.scalings)
-    return infer(network, data).log_density + slope(data)
+    return row_log_density(network, data) + slope(data)
 
 
 def slope(data: Dataset) -> Floats:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from json import dumps
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -12,6 +13,7 @@ from .coordinates import Floats, Readings
 from .dataset import Ints
 from .layout import GroupLayout, Layout
 from .network import Network
+from .row_bytes import text_column
 from .transforms import forward
 
 ATOM_DISTANCE = 3.0  # standard deviations between an atom, or an absent part, and anything else
@@ -24,6 +26,7 @@ class Neighbours:
         """Build a tree a group; a model without training rows finds nothing."""
         self.network = network
         self.ids = model.training.ids if model.training else ()
+        self.names = text_column(dumps(name, ensure_ascii=False) for name in self.ids)
         rows = training_readings(model, network.layout) if self.ids else None
         self._points = [] if rows is None else self._embed(rows)
         self._trees = [_tree(points) for points in self._points]
@@ -59,8 +62,12 @@ class Neighbours:
 
 
 def _tree(points: Floats) -> tuple[cKDTree, Ints] | None:
+    """Return a tree of the distinct points and where each stands first."""
     place = np.flatnonzero(np.isfinite(points).all(axis=1))
-    return (cKDTree(points[place]), place) if len(place) else None
+    if not len(place):
+        return None
+    distinct, first = np.unique(points[place], axis=0, return_index=True)
+    return cKDTree(distinct), place[first]
 
 
 def embed(values: Floats, group: GroupLayout, center: Floats, scale: Floats) -> Floats:

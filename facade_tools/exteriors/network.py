@@ -128,14 +128,7 @@ def infer(network: Network, data: Dataset, weights: Weights | None = None) -> Po
     weights: of the rows in `joint`; 1 without. Lateral parents must be known where their children
     are observed (`density.log_density` treats other rows).
     """
-    local = [
-        local_log_density(family, group, data.features)
-        for family, group in zip(network.families, data.groups, strict=True)
-    ]
-    joint = bit_log_density(network.bits, data.bits) + log_(network.style)
-    messages = [marginal(f, table) for f, table in zip(network.families, local, strict=True)]
-    for message in messages:
-        joint = joint + message
+    local, messages, joint = _upwards(network, data)
     log_density = log_sum(joint)
     style = np.exp(joint - log_density[:, None])
     rows = weights.groups if weights else [None] * len(local)
@@ -146,6 +139,24 @@ def infer(network: Network, data: Dataset, weights: Weights | None = None) -> Po
         )
     ]
     return Posterior(log_density, style, tuple(p[0] for p in pairs), tuple(p[1] for p in pairs))
+
+
+def row_log_density(network: Network, data: Dataset) -> Floats:
+    """Return what `infer` finds for `log_density` (n,), without the posteriors."""
+    return log_sum(_upwards(network, data)[2])
+
+
+def _upwards(network: Network, data: Dataset) -> tuple[list[Floats], list[Floats], Floats]:
+    """Return log P(group | H) and log P(group | S) of all groups, and log P(row, S) (n, |S|)."""
+    local = [
+        local_log_density(family, group, data.features)
+        for family, group in zip(network.families, data.groups, strict=True)
+    ]
+    messages = [marginal(f, table) for f, table in zip(network.families, local, strict=True)]
+    joint = bit_log_density(network.bits, data.bits) + log_(network.style)
+    for message in messages:
+        joint = joint + message
+    return local, messages, joint
 
 
 def _clusters(

@@ -15,7 +15,7 @@ from .network import Family, Network, bit_log_density, topological
 from .physical import settle
 from .shared_values import SharedValues, take_up
 
-BLOCK = 1024
+BLOCK = 4096
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..artifacts.model import Model
+from ..compiled import compiled
 from .coordinates import Bits, Floats
-from .dataset import Masks
+from .dataset import Ints, Masks
 from .groups import ATOM_TOLERANCE
 from .neighbours import training_readings
 from .network import Network
@@ -71,17 +72,29 @@ def take_up(
     """
     for one in coordinates:
         column = values[one.group][:, one.index]
-        place = np.searchsorted(one.values, column)
-        low = np.searchsorted(one.values, column - one.reach, side="left")
-        high = np.searchsorted(one.values, column + one.reach, side="right")
-        low = np.maximum(np.minimum(low, place - AROUND), 0)
-        high = np.minimum(np.maximum(high, place + AROUND), len(one.values))
-        drawn = low + (rng.random(len(column)) * (high - low)).astype(np.int64)
+        drawn = pick_around(one.values, column, rng.random(len(column)), one.reach)
         near = np.abs(one.values[drawn] - column) <= FAR * one.reach
         moved = _dense(column, one.atoms) & near & one.shared[drawn]
         if fixed is not None:
             moved &= fixed[one.group][:, one.index] == 0
         column[moved] = one.values[drawn[moved]]
+
+
+@compiled
+def pick_around(values: Floats, column: Floats, u: Floats, reach: float) -> Ints:
+    """Return for each number (n,) the index of one of the sorted values around it, by u in [0, 1).
+
+    Around: within `reach`, and at least the next `AROUND` on either side.
+    """
+    out = np.empty(len(column), dtype=np.int64)
+    for i in range(len(column)):
+        place = np.searchsorted(values, column[i])
+        low = np.searchsorted(values, column[i] - reach)
+        high = np.searchsorted(values, column[i] + reach, side="right")
+        low = max(min(low, place - AROUND), 0)
+        high = min(max(high, place + AROUND), len(values))
+        out[i] = low + np.int64(u[i] * (high - low))
+    return out
 
 
 def _dense(column: Floats, atoms: tuple[float, ...]) -> Masks:

@@ -1,11 +1,11 @@
-"""Textured meshes by the ending of their file: OBJ by our own reader, the rest through trimesh."""
+"""Textured meshes by the ending of their file: glTF through trimesh, the rest by our readers."""
 
 from __future__ import annotations
 
 import logging
-import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +15,11 @@ from ..errors import InvalidInput
 from ..geometry.arrays import Floats
 from ..imaging.image_io import Picture
 from .textured import GREY, Paint, TexturedMesh, joined, read_bytes
+from .textured_dae import Y_UP, read_dae
 from .textured_obj import read_obj
+from .textured_ply import read_ply
 
 ENDINGS = (".obj", ".glb", ".gltf", ".ply", ".dae")
-Y_UP = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]], dtype=np.float64)
 
 
 def read_textured(path: Path) -> TexturedMesh:
@@ -31,23 +32,12 @@ def read_textured(path: Path) -> TexturedMesh:
         raise InvalidInput(f"is no mesh that can be read; expected {', '.join(ENDINGS)}").at(
             str(path)
         )
-    if ending == ".obj":
-        return read_obj(path)
-    data = read_bytes(path)
+    own = {".obj": read_obj, ".ply": read_ply, ".dae": read_dae}
+    if ending in own:
+        return own[ending](path)
+    read_bytes(path)
     mesh = _through_trimesh(path)
-    matrix = Y_UP if ending in (".glb", ".gltf") else np.eye(3)
-    if ending == ".dae":
-        matrix = _collada_frame(data[:20_000].decode("utf-8", errors="replace"))
-    vertices = mesh.vertices @ matrix.T
-    return TexturedMesh(vertices, mesh.faces, mesh.uv, mesh.paint, mesh.paints, mesh.notes)
-
-
-def _collada_frame(head: str) -> Floats:
-    """Return the matrix to metres, z up, of a COLLADA file's asset element."""
-    unit = re.search(r"<unit\b[^>]*\bmeter\s*=\s*[\"']([0-9.eE+-]+)", head)
-    axis = re.search(r"<up_axis>\s*([XYZ])_UP", head)
-    scale = float(unit.group(1)) if unit else 1.0
-    return scale * (np.eye(3) if axis and axis.group(1) == "Z" else Y_UP)
+    return replace(mesh, vertices=mesh.vertices @ Y_UP.T)
 
 
 def _through_trimesh(path: Path) -> TexturedMesh:
@@ -67,8 +57,7 @@ def _through_trimesh(path: Path) -> TexturedMesh:
     if not parts:
         raise InvalidInput("holds no faces; expected a mesh").at(str(path))
     mesh = joined(parts)
-    said = (*mesh.notes, *dict.fromkeys(notes))
-    return TexturedMesh(mesh.vertices, mesh.faces, mesh.uv, mesh.paint, mesh.paints, said)
+    return replace(mesh, notes=(*mesh.notes, *dict.fromkeys(notes)))
 
 
 @contextmanager

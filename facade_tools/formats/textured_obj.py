@@ -9,11 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InvalidInput, Place
-from ..geometry.arrays import Integers, Points3
-from ..geometry.triangulate import triangulate_face
 from .textured import GREY, Paint, TexturedMesh, Textures, read_bytes
-
-MAX_CORNERS = 20_000_000
+from .textured_polygons import MAX_CORNERS, polygonal_mesh
 
 
 @dataclass
@@ -98,51 +95,12 @@ def _paint_index(content: _Content, name: str) -> int:
 
 
 def _triangulated(content: _Content, paints: tuple[Paint, ...]) -> TexturedMesh:
-    vertices = _positions(content)
     texture = np.array([(*pair, math.nan, math.nan)[:2] for pair in content.texture] or [(0, 0)])
     texture = np.vstack([texture, [math.nan, math.nan]])  # index -1
-    faces, uv, paint = [], [], []
-    seen: set[tuple[tuple[float, ...], ...]] = set()
-    doubled = 0
-    rounded = [tuple(row) for row in np.round(vertices, 4).tolist()]
-    for corners, material in zip(content.polygons, content.paint, strict=True):
-        key = tuple(sorted(rounded[vertex] for vertex, _ in corners))
-        if key in seen:
-            doubled += 1
-            continue
-        seen.add(key)
-        ring = np.array([vertex for vertex, _ in corners])
-        slots = np.array([slot for _, slot in corners])
-        for triangle in _ears(vertices, ring):
-            faces.append(ring[triangle])
-            uv.append(texture[slots[triangle]])
-            paint.append(material)
-    notes = (f"{doubled} faces stand twice: kept once",) if doubled else ()
-    return TexturedMesh(
-        vertices,
-        np.array(faces, dtype=np.int64).reshape(-1, 3),
-        np.array(uv, dtype=np.float64).reshape(-1, 3, 2),
-        np.array(paint, dtype=np.int64),
-        paints,
-        notes,
-    )
-
-
-def _positions(content: _Content) -> Points3:
+    rings = [np.array([vertex for vertex, _ in corners]) for corners in content.polygons]
+    uv = [texture[[slot for _, slot in corners]] for corners in content.polygons]
     vertices = np.array(content.positions, dtype=np.float64)
-    if vertices.ndim != 2 or vertices.shape[1] != 3 or not np.isfinite(vertices).all():
-        raise InvalidInput("vertices need three finite coordinates")
-    return vertices
-
-
-def _ears(vertices: Points3, ring: Integers) -> Integers:
-    """Return the triangles (k, 3) of one polygon as positions in its ring."""
-    if len(ring) == 3:
-        return np.array([[0, 1, 2]])
-    points = vertices[ring]
-    if np.ptp(points, axis=0).max() <= 0:
-        return np.empty((0, 3), dtype=np.int64)
-    return triangulate_face(points, [np.arange(len(ring))])
+    return polygonal_mesh(vertices, rings, uv, content.paint, paints)
 
 
 def _materials(folder: Path, libraries: list[str], textures: Textures) -> dict[str, Paint]:

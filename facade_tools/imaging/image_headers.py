@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ..errors import InvalidInput
+from . import sgi
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +23,7 @@ class Header:
 
 
 def header(data: bytes, name: str) -> Header:
-    """Return the header of a JPEG, PNG, TIFF, BMP, WebP or GIF. Raises InvalidInput with `name`."""
+    """Return the header of a picture of any kind known here. Raises InvalidInput with `name`."""
     read = next((one for magic, one in _READERS if data.startswith(magic)), None)
     if read is None:
         raise InvalidInput(
@@ -113,6 +114,11 @@ def _tiff(data: bytes) -> Header:
     return Header("TIFF", values.get(256, 0), values.get(257, 0), 2 if more else 1, deep)
 
 
+def _sgi(data: bytes) -> Header:
+    width, height, _, _ = sgi.size(data)
+    return Header("SGI", width, height)
+
+
 _READERS: tuple[tuple[bytes, Callable[[bytes], Header]], ...] = (
     (b"\x89PNG\r\n\x1a\n", _png),
     (b"\xff\xd8", _jpeg),
@@ -121,4 +127,5 @@ _READERS: tuple[tuple[bytes, Callable[[bytes], Header]], ...] = (
     (b"RIFF", _webp),
     (b"II*\0", _tiff),
     (b"MM\0*", _tiff),
+    (sgi.MAGIC, _sgi),
 )

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ..artifacts.store import digest, unreadable
 from ..errors import InvalidInput
 from .image_headers import header
+from .sgi import decoded_sgi
 
 Picture = NDArray[np.uint8]  # (height, width, 3) RGB
 
@@ -58,9 +59,14 @@ def decoded(data: bytes, name: str) -> Picture:
         raise InvalidInput("is animated or has several pages; expected one picture").at(name)
     if not info.complete:
         raise InvalidInput(f"is a truncated {info.format}; expected a whole file").at(name)
-    with _quiet():
-        flags = cv2.IMREAD_UNCHANGED if info.deep else cv2.IMREAD_COLOR
-        picture = _decode(data, flags)
+    picture: NDArray[np.generic] | None
+    if info.format == "SGI":
+        found = decoded_sgi(data)
+        picture = found if found is None or found.ndim == 2 else found[:, :, ::-1]
+    else:
+        with _quiet():
+            flags = cv2.IMREAD_UNCHANGED if info.deep else cv2.IMREAD_COLOR
+            picture = _decode(data, flags)
     if picture is None:
         raise InvalidInput(f"cannot be decoded as {info.format}").at(name)
     return _eight_bit_rgb(picture)

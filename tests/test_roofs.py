@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import catalogue
@@ -12,7 +13,7 @@ import pytest
 import shapely
 import trimesh
 
-from facade_tools.artifacts.building import Building, Roof
+from facade_tools.artifacts.building import Box, Building, Roof
 from facade_tools.artifacts.footprint import Footprint
 from facade_tools.errors import InvalidInput
 from facade_tools.geometry.polygons import oriented, shape_of, signed_area, sound
@@ -105,6 +106,18 @@ def test_gabled_wing_meets_the_main_roof_in_valleys() -> None:
     assert height(patches, 7.5, 9.0) == pytest.approx(6 + 3.0)  # below the main ridge
     assert height(patches, 7.5, 11.9) == pytest.approx(6 + 0.1)  # and does not come out behind
     assert height(patches, 5.5, 6.2) == pytest.approx(6 + 0.5)  # valley
+
+
+def test_a_gable_that_would_come_out_of_another_roof_is_hidden() -> None:
+    main = Box("main", "general", 4.7, 7.3, 9.4, 14.6, 3.0, Roof("gable", 38, "y"))
+    alone = building_solid(Building("b", (main,)))
+    inside = Box("wing", "general", 5.0, 6.4, 8.0, 7.5, 2.3, Roof("gable", 38, "x"))
+    assert as_mesh(building_solid(Building("b", (main, inside)))).volume == pytest.approx(
+        as_mesh(alone).volume
+    )
+    flush = replace(inside, x=4.0, height=3.0)  # the cross gable of a house front
+    crossed = as_mesh(building_solid(Building("b", (main, flush))))
+    assert crossed.volume > as_mesh(alone).volume + 5
 
 
 def test_low_wing_is_clipped_by_the_high_wall() -> None:

@@ -16,6 +16,7 @@ from .roofs_patch import FLAT, Patch, Rectangle
 from .roofs_polygon import sloped_patches
 
 SAME = 1e-6  # metres: heights and edges closer than this are equal
+FLUSH = 0.3  # metres: a gable nearer than this to a neighbour's wall stands in that wall
 RIDGED = ("gable", "hip", "mansard")
 
 
@@ -150,8 +151,8 @@ def _extended(wing: _Wing, wings: list[_Wing]) -> list[tuple[Rectangle, Sides]]:
     own = sloping_sides(wing.roof)
     if wing.roof.style == "shed":
         return [(wing.rectangle, _turned(wing, others))]
-    found = [(wing.rectangle, own)]
     hosts = [other for other in others if _carries(other, wing)]
+    found = [(wing.rectangle, _hidden_ends(wing, hosts, own))]
     for axis in (0, 1):
         if wing.roof.style in RIDGED and not (wing.roof.style == "gable" and own[2 * axis]):
             low, high = (_reach(wing.rectangle, axis, end, hosts) for end in (0, 1))
@@ -164,6 +165,45 @@ def _carries(host: _Wing, wing: _Wing) -> bool:
     """Whether a wing's roof may run on over (or hidden inside) a neighbour."""
     difference = host.rectangle.eaves - wing.rectangle.eaves
     return difference >= -SAME and (host.roof.style in RIDGED or difference >= wing.rise)
+
+
+def _hidden_ends(wing: _Wing, hosts: list[_Wing], sides: Sides) -> Sides:
+    """Return the slopes of a gable, hipped at ends that vanish in a neighbour's roof that way.
+
+    A gable there would come out of that roof again, like a dormer that nobody asked for.
+    """
+    if wing.roof.style != "gable":
+        return sides
+    found = sides
+    for end in (k for k in range(4) if not sides[k]):
+        patches = box_roof(wing.rectangle, wing.roof, wing.id, 0, _hipped(sides, end))
+        slope = patches[-1] if end > 1 else patches[0]
+        within = [host for host in hosts if host.roof.style in RIDGED and _inside(wing, end, host)]
+        if any(_under(slope, host) for host in within):
+            found = _hipped(found, end)
+    return found
+
+
+def _hipped(sides: Sides, end: int) -> Sides:
+    left, right, front, back = (slopes or k == end for k, slopes in enumerate(sides))
+    return left, right, front, back
+
+
+def _inside(wing: _Wing, end: int, host: _Wing) -> bool:
+    """Whether an end of a wing lies well within a neighbour, not flush with its wall."""
+    r, h = wing.rectangle, host.rectangle
+    depth = (r.x0 - h.x0, h.x1 - r.x1, r.y0 - h.y0, h.y1 - r.y1)
+    return depth[end] > FLUSH
+
+
+def _under(patch: Patch, host: _Wing) -> bool:
+    """Whether a patch lies under a roof that is the lowest of its planes, so that corners tell."""
+    ring, r = patch.rings[0], host.rectangle
+    inside = (ring >= (r.x0 - SAME, r.y0 - SAME)) & (ring <= (r.x1 + SAME, r.y1 + SAME))
+    points = np.column_stack([ring, np.ones(len(ring))])
+    planes = np.array([other.plane for other in box_roof(r, host.roof, host.id, 0)])
+    surface = (points @ planes.T).min(axis=1)
+    return bool(inside.all() and (points @ np.array(patch.plane) <= surface + SAME).all())
 
 
 def _turned(wing: _Wing, others: list[_Wing]) -> Sides:

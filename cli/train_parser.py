@@ -20,16 +20,16 @@ from . import _options
     "--features", type=click.Choice(["context", "patch"]), default="context", show_default=True,
     help="context: boosted trees with auto-context; patch: the forest of TSKP10.",
 )  # fmt: skip
-@click.option("--stages", type=click.IntRange(1, 6), default=3, show_default=True,
-              help="Stages of auto-context.")  # fmt: skip
+@click.option("--stages", type=click.IntRange(1, 6), default=4, show_default=True,
+              help="Stages of auto-context; the last two see the picture itself.")  # fmt: skip
 @click.option("--rounds", type=click.IntRange(1, 2000), default=80, show_default=True,
-              help="Trees a class of the last stage.")  # fmt: skip
+              help="Trees a class of the last two stages.")  # fmt: skip
 @click.option("--pixels", type=click.IntRange(10, 10**6), default=1300, show_default=True,
               help="Pixels sampled a picture, variant and stage.")  # fmt: skip
 @click.option("--height", type=click.IntRange(32, 2000), default=576, show_default=True,
               help="Working resolution: rows of a picture, pixels.")  # fmt: skip
 @click.option("--coarse", type=click.IntRange(32, 2000), default=288, show_default=True,
-              help="Rows that all stages but the last see; at most --height, pixels.")  # fmt: skip
+              help="Rows that all stages but the last two see; at most --height.")  # fmt: skip
 @click.option("--augment", type=click.IntRange(0, 20), default=1, show_default=True,
               help="Varied copies a picture: mirror, light, blur, perspective.")  # fmt: skip
 @click.option("--balance", type=click.FloatRange(0, 1), default=0.0, show_default=True,

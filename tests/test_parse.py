@@ -5,6 +5,7 @@ import itertools
 import json
 import struct
 import zlib
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -130,8 +131,17 @@ def rendered_picture(width, height):
     return render_facade(builtin("haussmann"), width, height, rng=rng)[1]
 
 
+def without_priors(grammar):
+    """Sizes that only bound: priors of sizes would trade clean pixels for usual sizes."""
+    rules = {
+        name: replace(rule, sizes={k: replace(s, weight=0.0) for k, s in rule.sizes.items()})
+        for name, rule in grammar.rules.items()
+    }
+    return replace(grammar, rules=rules)
+
+
 def solved(name, belief):
-    made = plan(builtin(name))
+    made = plan(without_priors(builtin(name)))
     shape = belief.shape[1:]
     solution = dp.solve(field_of(belief, CLASSES, made), made)
     tree = derivation(made, solution.layout, Frame(shape, shape))

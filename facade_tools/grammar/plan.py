@@ -134,14 +134,16 @@ class _Compiler:
         if not tiles:
             labels = tuple(self.grammar.terminals[kind] for kind in kinds)
             return self._state(RowState(group, labels, tuple(kinds), size, (), 0))
-        bands = {tile: automaton(self.bodies[tile]).symbols for tile in tiles}
+        leader = self.grammar.rules[tiles[0]].like or tiles[0]
+        cut = {*tiles, leader}
+        bands = {tile: automaton(self.bodies[tile]).symbols for tile in cut}
         counter = iter(range(len(bands[tiles[0]])))
 
         def band(_: str) -> Expression:
             index = next(counter)
-            parts = tuple(bands[kind][index] if kind in bands else kind for kind in kinds)
+            parts = tuple(bands[kind][index] if kind in tiles else kind for kind in kinds)
             labels = tuple(self.grammar.terminals[part] for part in parts)
-            bounds = self.grammar.rules[tiles[0]].sizes.get(bands[tiles[0]][index], Size())
+            bounds = self.grammar.rules[leader].sizes.get(bands[leader][index], Size())
             return self._state(RowState(group, labels, parts, bounds, (), index))
 
         return replaced(self.bodies[tiles[0]], band)

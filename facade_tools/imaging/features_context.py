@@ -29,7 +29,9 @@ def context_features(probabilities: Probabilities) -> Features:
     >>> context_features(np.full((2, 4, 6), 0.5, np.float32)).shape[1:]
     (4, 6)
     """
-    return stacked([GAIN * plane for one in probabilities for plane in _planes(one)])
+    # class by class: the planes of one are in memory as floats at a time
+    parts = [stacked([GAIN * plane for plane in _planes(one)]) for one in probabilities]
+    return np.concatenate(parts)
 
 
 def belief_features(probabilities: Probabilities) -> Features:

@@ -1,6 +1,6 @@
 """Auto-context: each stage of the classifier also sees what the stage before believes.
 
-All stages but the last look at a coarse picture and only give context; the last one looks at the
+The first stages look at a coarse picture and only give context; the last one or two look at the
 picture itself, where the context leaves doubt.
 """
 
@@ -21,13 +21,14 @@ from ..imaging.features_context import (
     repeated,
 )
 from ..imaging.image_io import fitted
-from .final import finished, planes_of
+from .final import Planes, finished, planes_again, planes_of
 from .trees import Codes, Trees, softmax
 
 Labels = NDArray[np.uint8]  # (height, width), 0 is ignored, k is class k - 1
 
 EARLY_STRIDE = 3  # early stages only give context, which is smooth
 COARSE_PIXELS = 160_000
+FINE = 2  # stages that see the picture itself
 
 Fit = Callable[[Codes, NDArray[np.intp]], Trees]
 
@@ -83,13 +84,21 @@ def _between(coarse: Probabilities, stride: int, shape: tuple[int, int]) -> Prob
     return np.stack(planes)
 
 
-def run_stages(stages: Sequence[Trees], picture: Picture, height: int) -> Probabilities:
-    """Return the belief of the last stage about a picture; the others see `height` rows of it."""
+def run_stages(stages: Sequence[Trees], picture: Picture, height: int, fine: int) -> Probabilities:
+    """Return the belief of the last stages about a picture.
+
+    fine: how many of the stages see the picture itself, 1 or 2; the others see `height` rows.
+    """
     coarse = fitted(picture, height, COARSE_PIXELS)
     before: Probabilities | None = None
-    for trees in stages[:-1]:
+    for trees in stages[:-fine]:
         before = predict(trees, features_of(coarse, before), EARLY_STRIDE)
-    return finished(stages[-1], planes_of(picture, coarse, before))
+    first = finished(stages[-fine], planes_of(picture, coarse, before))
+    if fine == 1:
+        return first
+    second = finished(stages[-1], planes_again(picture, first))
+    mean: Probabilities = (first + second) / np.float32(2)
+    return mean
 
 
 def sample_pixels(
@@ -109,14 +118,14 @@ def train_stages(
     *,
     rng: np.random.Generator,
 ) -> tuple[Trees, ...]:
-    """Return the stages of a classifier, one a fit.
+    """Return the stages of a classifier, one a fit; the last two see the picture itself.
 
     The belief that a stage trains on comes from models that did not see the picture: the stage
     before is trained once for each fold without it, and once on everything to be kept.
     """
     before: list[Probabilities | None] = [None] * len(examples)
     kept: list[Trees] = []
-    for fit in fits[:-1]:
+    for fit in fits[:-FINE]:
         chosen = [sample_pixels(e.coarse_labels > 0, pixels, rng) for e in examples]
         codes = [_codes(e, b, at) for e, b, at in zip(examples, before, chosen, strict=True)]
         labels = [
@@ -124,9 +133,12 @@ def train_stages(
             for e, at in zip(examples, chosen, strict=True)
         ]
         kept.append(fit(np.concatenate(codes), np.concatenate(labels)))
-        before = list(_left_out(examples, before, codes, labels, fit))
-    kept.append(_last_stage(examples, before, fits[-1], pixels, rng))
-    return tuple(kept)
+        models = _left_out(examples, codes, labels, fit)
+        before = [
+            predict(models[e.fold], features_of(e.coarse, b), EARLY_STRIDE)
+            for e, b in zip(examples, before, strict=True)
+        ]
+    return (*kept, *_fine_stages(examples, before, fits[-FINE:], pixels, rng))
 
 
 def _codes(example: Example, before: Probabilities | None, at: NDArray[np.intp]) -> Codes:
@@ -136,34 +148,48 @@ def _codes(example: Example, before: Probabilities | None, at: NDArray[np.intp])
 
 def _left_out(
     examples: Sequence[Example],
-    before: Sequence[Probabilities | None],
     codes: Sequence[Codes],
     labels: Sequence[NDArray[np.intp]],
     fit: Fit,
-) -> Iterator[Probabilities]:
-    """Yield for each example the belief of a model trained without its fold."""
+) -> dict[int, Trees]:
+    """Return for each fold a model trained without it."""
     models: dict[int, Trees] = {}
     for fold in sorted({e.fold for e in examples}):
         rest = [i for i, e in enumerate(examples) if e.fold != fold]
         models[fold] = fit(
             np.concatenate([codes[i] for i in rest]), np.concatenate([labels[i] for i in rest])
         )
-    for example, belief in zip(examples, before, strict=True):
-        yield predict(models[example.fold], features_of(example.coarse, belief), EARLY_STRIDE)
+    return models
 
 
-def _last_stage(
+def _fine_stages(
     examples: Sequence[Example],
     before: Sequence[Probabilities | None],
-    fit: Fit,
+    fits: Sequence[Fit],
     pixels: int,
     rng: np.random.Generator,
-) -> Trees:
+) -> Iterator[Trees]:
     """Train on pixels that the stages before leave in doubt."""
     codes, labels = [], []
     for example, belief in zip(examples, before, strict=True):
         planes = planes_of(example.picture, example.coarse, belief)
-        at = sample_pixels(planes.doubtful() & (example.labels > 0), pixels, rng)
-        codes.append(planes.codes(at))
-        labels.append(example.labels.ravel()[at].astype(np.intp) - 1)
-    return fit(np.concatenate(codes), np.concatenate(labels))
+        code, label = _in_doubt(example, planes, pixels, rng)
+        codes.append(code)
+        labels.append(label)
+    yield fits[0](np.concatenate(codes), np.concatenate(labels))
+    if len(fits) == 1:
+        return
+    models = _left_out(examples, codes, labels, fits[0])
+    for i, (example, belief) in enumerate(zip(examples, before, strict=True)):
+        planes = planes_of(example.picture, example.coarse, belief)
+        first = finished(models[example.fold], planes)
+        again = planes_again(example.picture, first)
+        codes[i], labels[i] = _in_doubt(example, again, pixels, rng)
+    yield fits[1](np.concatenate(codes), np.concatenate(labels))
+
+
+def _in_doubt(
+    example: Example, planes: Planes, pixels: int, rng: np.random.Generator
+) -> tuple[Codes, NDArray[np.intp]]:
+    at = sample_pixels(planes.doubtful() & (example.labels > 0), pixels, rng)
+    return planes.codes(at), example.labels.ravel()[at].astype(np.intp) - 1

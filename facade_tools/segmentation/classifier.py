@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import zipfile
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -41,7 +42,7 @@ class Classifier:
 
     kind: `context` (features of the picture, then of the beliefs too) or `patch` (the paper's
     forest). height: rows of the working resolution. coarse: rows at which all stages but the last
-    look at the picture. patch: side of the patches. about: free notes.
+    `fine` ones look at the picture. patch: side of the patches. about: free notes.
     """
 
     kind: str
@@ -51,19 +52,33 @@ class Classifier:
     coarse: int
     patch: int = 0
     about: str = ""
+    fine: int = 1
 
     def working(self, picture: Picture) -> Picture:
         """Return a picture at the resolution that the classifier works at."""
         return fitted(picture, self.height, MAX_PIXELS)
 
     def probabilities(self, working: Picture) -> Probabilities:
-        """Return class probabilities (classes, height, width) of a picture at working size."""
+        """Return class probabilities (classes, height, width) of a picture at working size.
+
+        Stages of context are asked about the picture and its mirror image: facades have no side.
+        """
         if self.kind == "context":
-            return run_stages(self.stages, working, self.coarse)
+            return self._both_ways(working)
         codes = patch_codes(working, patch_tests(self.patch))
         shares = self.stages[0].scores(codes)
         shares /= np.maximum(shares.sum(axis=1, keepdims=True), np.float32(1e-9))
         return np.ascontiguousarray(shares.T).reshape(-1, *working.shape[:2])
+
+    def _both_ways(self, working: Picture) -> Probabilities:
+        def believed(picture: Picture) -> Probabilities:
+            return run_stages(self.stages, picture, self.coarse, self.fine)
+
+        mirrored = np.ascontiguousarray(working[:, ::-1])
+        with ThreadPoolExecutor(2) as pool:  # compiled loops let go of the interpreter
+            one, other = pool.map(believed, (working, mirrored))
+        mean: Probabilities = (one + other[:, :, ::-1]) / np.float32(2)
+        return mean
 
 
 def save(classifier: Classifier) -> bytes:
@@ -75,6 +90,7 @@ def save(classifier: Classifier) -> bytes:
         "height": np.array(classifier.height),
         "coarse": np.array(classifier.coarse),
         "patch": np.array(classifier.patch),
+        "fine": np.array(classifier.fine),
         "about": np.array(classifier.about),
     }
     for number, trees in enumerate(classifier.stages):
@@ -117,7 +133,8 @@ def decoded(data: bytes) -> Classifier:
         if str(arrays["format"]) != FORMAT:
             raise InvalidInput(f"is {str(arrays['format'])[:40]!r}; expected {FORMAT}")
         kind = str(arrays["kind"])
-        height, coarse, patch = (int(arrays[name]) for name in ("height", "coarse", "patch"))
+        numbers = ("height", "coarse", "patch", "fine")
+        height, coarse, patch, fine = (int(arrays[name]) for name in numbers)
         classes = tuple(str(name) for name in np.atleast_1d(arrays["classes"]))
         about = str(arrays["about"])
         count = sum(name.startswith("feature") for name in arrays)
@@ -130,7 +147,9 @@ def decoded(data: bytes) -> Classifier:
         raise InvalidInput("is no classifier of a known kind")
     if not 16 <= coarse <= height <= 4096 or not 0 <= patch <= 101:
         raise InvalidInput("has a working resolution out of range")
-    return Classifier(kind, classes, stages, height, coarse, patch, about)
+    if not 1 <= fine <= min(2, len(stages)):
+        raise InvalidInput("has a number of fine stages out of range")
+    return Classifier(kind, classes, stages, height, coarse, patch, about, fine)
 
 
 def _arrays(data: bytes) -> dict[str, NDArray[Any]]:

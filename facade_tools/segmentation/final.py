@@ -1,8 +1,11 @@
-"""The last stage: pixels of the picture's own resolution that the stages before leave in doubt."""
+"""The last stages: pixels of the picture's own resolution that the stages before leave in doubt.
+
+The first of them sees where edges run and the coarse belief; the second what the first believes
+around a pixel. The result is the mean of both.
+"""
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,19 +22,18 @@ from ..imaging.features_fine import enlarged, fine_features
 from .trees import Codes, Trees, softmax
 
 CERTAIN = 0.98  # what the stages before believe more than this stays
-BLOCK = 20_000  # pixels whose codes are in memory at once, in each thread
-THREADS = 2
+BLOCK = 20_000  # pixels whose codes are in memory at once
 
 
 @dataclass(frozen=True, slots=True)
 class Planes:
-    """All that the last stage sees of a picture.
+    """All that a last stage sees of a picture.
 
-    coarse: planes of the working resolution. fine: planes of the picture. belief: of the stages
-    before, interpolated; None where there are none.
+    coarse: planes of the coarse picture, if any. fine: planes of the picture. belief: of the
+    stages before; None where there are none.
     """
 
-    coarse: Features
+    coarse: Features | None
     fine: Features
     belief: Probabilities | None
 
@@ -41,7 +43,7 @@ class Planes:
         return self.fine.shape[1], self.fine.shape[2]
 
     def doubtful(self) -> NDArray[np.bool_]:
-        """Return where the last stage is asked, (height, width)."""
+        """Return where the stage is asked, (height, width)."""
         if self.belief is None:
             return np.ones(self.shape, np.bool_)
         doubt: NDArray[np.bool_] = self.belief.max(axis=0) < CERTAIN
@@ -51,14 +53,16 @@ class Planes:
         """Return the features of pixels given by flat indices, (pixels, features)."""
         height, width = self.shape
         y, x = np.divmod(at, width)
-        rows = (2 * y + 1) * self.coarse.shape[1] // (2 * height)
-        columns = (2 * x + 1) * self.coarse.shape[2] // (2 * width)
-        parts = [self.coarse[:, rows, columns], self.fine[:, y, x]]
+        parts = [self.fine[:, y, x]]
+        if self.coarse is not None:
+            rows = (2 * y + 1) * self.coarse.shape[1] // (2 * height)
+            columns = (2 * x + 1) * self.coarse.shape[2] // (2 * width)
+            parts.insert(0, self.coarse[:, rows, columns])
         return np.ascontiguousarray(np.concatenate(parts).T)
 
 
 def planes_of(picture: Picture, coarse: Picture, before: Probabilities | None) -> Planes:
-    """Return the planes of a picture, its coarse version, and the coarse belief about it."""
+    """Return what the first last stage sees: a picture, its coarse version and belief about it."""
     low, fine = pixel_features(coarse), fine_features(picture)
     if before is None:
         return Planes(low, fine, None)
@@ -69,6 +73,13 @@ def planes_of(picture: Picture, coarse: Picture, before: Probabilities | None) -
     return Planes(np.concatenate([low, context_features(before)]), fine, belief)
 
 
+def planes_again(picture: Picture, belief: Probabilities) -> Planes:
+    """Return what the second last stage sees: a picture and the belief of the first about it."""
+    means = [belief_features(one) for one in repeated(belief)]
+    fine = np.concatenate([fine_features(picture), context_features(belief), *means])
+    return Planes(None, fine, belief)
+
+
 def finished(trees: Trees, planes: Planes) -> Probabilities:
     """Return class probabilities of every pixel, (classes, height, width)."""
     where = np.flatnonzero(planes.doubtful())
@@ -76,11 +87,7 @@ def finished(trees: Trees, planes: Planes) -> Probabilities:
     out = np.zeros((trees.classes, height * width), np.float32)
     if planes.belief is not None:
         out[:] = planes.belief.reshape(trees.classes, -1)
-
-    def fill(at: NDArray[np.intp]) -> None:
+    for start in range(0, len(where), BLOCK):
+        at = where[start : start + BLOCK]
         out[:, at] = softmax(trees.scores(planes.codes(at))).T
-
-    blocks = [where[start : start + BLOCK] for start in range(0, len(where), BLOCK)]
-    with ThreadPoolExecutor(THREADS) as pool:  # compiled loops let go of the interpreter
-        list(pool.map(fill, blocks))
     return out.reshape(-1, height, width)

@@ -16,7 +16,7 @@ from ..errors import InvalidInput
 from ..imaging.features import Picture
 from ..imaging.image_io import PICTURES, fitted, read_photo
 from .augmentation import varied
-from .autocontext import Example, Labels, example, train_stages
+from .autocontext import FINE, Example, Labels, example, train_stages
 from .boosting import BoostOptions, train_boosted
 from .classifier import MAX_PIXELS, Classifier
 from .conventions import Convention
@@ -31,14 +31,14 @@ class TrainOptions:
     """How a classifier is trained.
 
     features: `context` or `patch`. stages: of auto-context. height: working resolution, rows.
-    coarse: rows at which all stages but the last look. pixels: sampled a picture, variant and
+    coarse: rows at which all stages but the last two look. pixels: sampled a picture, variant and
     stage. inner: folds by picture for the beliefs that later stages train on. augment: varied
     copies a picture. balance: 0 weighs pixels equally, 1 gives each class the same weight.
-    early, boost: trees of all stages but the last, and of the last.
+    early, boost: trees of all stages but the last two, and of these.
     """
 
     features: str = "context"
-    stages: int = 3
+    stages: int = 4
     height: int = 576
     coarse: int = 288
     pixels: int = 1300
@@ -104,9 +104,11 @@ def train(pairs: Sequence[Pair], options: TrainOptions, *, rng: np.random.Genera
         weights = class_weights(labels, len(classes), options.balance)
         return train_boosted(codes, labels, weights, len(classes), boost, seed=seed)
 
-    fits = [partial(fit, options.early)] * (options.stages - 1) + [partial(fit, options.boost)]
+    fine = min(FINE, options.stages)
+    early = [partial(fit, options.early)] * (options.stages - fine)
+    fits = early + [partial(fit, options.boost)] * fine
     stages = train_stages(examples, fits, options.pixels, rng=rng)
-    return Classifier("context", classes, stages, height, options.coarse, 0, about)
+    return Classifier("context", classes, stages, height, options.coarse, 0, about, fine)
 
 
 def _working(pair: Pair, height: int) -> Pair:

@@ -19,7 +19,8 @@ from .layout import Layout
 
 MIDDLE = 0.5
 GAP = 1e-3  # how far a porch keeps from the middle line, relative
-LEAST_STOREY = 2.3  # m: below it nobody stands upright
+LEAST_STOREY = 2.3  # m: of houses with floors above each other
+LOWEST = 2.1  # m: lower eaves leave no room for a door
 
 
 class Columns:
@@ -63,18 +64,26 @@ def storey_heights(values: tuple[Floats, ...], layout: Layout, typical: float) -
     return np.asarray(np.clip(typical, least, height / (floors - 0.5) * (1 - 1e-6)))
 
 
-def _raise_eaves(
+def _floors_under_eaves(
     values: tuple[Floats, ...], layout: Layout, fixed: tuple[Bits, ...] | None
 ) -> None:
-    """Raise houses, in place, whose storeys would be lower than a person stands."""
-    columns = Columns(values, layout)
-    found = columns.get("height", "r1", "r2")
-    if found:
-        height, r1, r2 = found
-        floors = 1 + (r1 > ATOM_TOLERANCE) + (np.isfinite(r2) & (r2 > ATOM_TOLERANCE))
-        least = LEAST_STOREY * np.maximum(floors - 0.5, 1.0) * (1 + 1e-5)
-        held = Columns(fixed, layout) if fixed else None
-        _put(height, np.maximum(height, least), held, "height")
+    """Suit floors and eaves, in place, where a storey would be lower than a person stands.
+
+    A floor for which the eaves are too low is none; where it is given, the eaves are raised.
+    """
+    found = Columns(values, layout).get("height", "r1", "r2")
+    if not found:
+        return
+    height, r1, r2 = found
+    held = Columns(fixed, layout) if fixed else None
+    for floors, share in ((3, r2), (2, r1)):
+        low = np.isfinite(share) & (height < LEAST_STOREY * (floors - 0.5))
+        name = {2: "r1", 3: "r2"}[floors]
+        _put(share, np.where(low, 0.0, share), held, name)
+    no_second_floor(values, layout)
+    above = (r1 > ATOM_TOLERANCE) + (np.isfinite(r2) & (r2 > ATOM_TOLERANCE)).astype(np.int64)
+    least = np.where(above > 0, LEAST_STOREY * (above + 0.5), LOWEST) * (1 + 1e-5)
+    _put(height, np.maximum(height, least), held, "height")
 
 
 def settle(
@@ -89,7 +98,7 @@ def settle(
     """
     _ranges(values, layout, fixed)
     no_second_floor(values, layout)
-    _raise_eaves(values, layout, fixed)
+    _floors_under_eaves(values, layout, fixed)
     columns, held = Columns(values, layout), Columns(fixed or (), layout) if fixed else None
     _garage(columns, held)
     _settle_garage(columns, held)

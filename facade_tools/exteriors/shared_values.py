@@ -19,7 +19,8 @@ from .groups import ATOM_TOLERANCE
 from .neighbours import training_readings
 from .network import Network
 
-LEAST = 3  # training buildings that make a value a shared one
+LEAST = 2  # training buildings that make a value a shared one: the leave-one-out estimate of how
+# often a new building has a value that an old one has
 REACH = 2.0  # least standard deviations within which training buildings count as near
 FAR = 5.0
 AROUND = 8

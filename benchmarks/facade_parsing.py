@@ -1,6 +1,7 @@
 """Facade parsing by folds: raw classifier, dp and walk, from a folder of images and label maps.
 
     python benchmarks/facade_parsing.py DATA [--convention ecp] [--folds 5] [--work FOLDER]
+    python benchmarks/facade_parsing.py DATA --convention cmp --grammars plain --limit 60 --only 0
 
 DATA holds images/ and labels/. Trained classifiers are kept in --work and used again.
 """
@@ -26,11 +27,7 @@ from facade_tools.segmentation.classifier import load, save
 from facade_tools.segmentation.conventions import convention
 from facade_tools.segmentation.deriving import Frame, derivation, regions_of
 from facade_tools.segmentation.energy import field_of
-from facade_tools.segmentation.evaluation import (
-    Tally,
-    boxes_of_labels,
-    boxes_of_regions,
-)
+from facade_tools.segmentation.evaluation import Tally, boxes_of_labels, boxes_of_regions
 from facade_tools.segmentation.parsing import raw_labels
 from facade_tools.segmentation.training import TrainOptions, read_pairs, train
 
@@ -81,17 +78,19 @@ def main():
     parser.add_argument("--classifier", help="test this one on everything instead of training")
     parser.add_argument("--work", type=Path, default=Path("build/facade_parsing"))
     parser.add_argument("--no-walk", action="store_true")
-    parser.add_argument("--limit", type=int, default=10**6, help="pictures")
+    parser.add_argument("--grammars", nargs="*", default=GRAMMARS, help="none: pixels alone")
+    parser.add_argument("--limit", type=int, default=10**6, help="pictures, spread over the set")
     args = parser.parse_args()
     cv2.setNumThreads(1)
     args.work.mkdir(parents=True, exist_ok=True)
     images, labels = str(args.data / "images"), str(args.data / "labels")
-    pairs = list(read_pairs(images, labels, convention(args.convention)))[: args.limit]
+    pairs = list(read_pairs(images, labels, convention(args.convention)))
+    pairs = pairs[:: max(1, len(pairs) // args.limit)][: args.limit]
     folds = item_generator(0, "folds").permutation(len(pairs)) % args.folds
     options = replace(TrainOptions(), features=args.features)
-    plans = {name: plan(builtin(name)) for name in GRAMMARS}
+    plans = {name: plan(builtin(name)) for name in args.grammars}
     solvers = ("dp",) if args.no_walk else ("dp", "walk")
-    keys = ["raw", *(f"{s} {g}" for s in solvers for g in GRAMMARS)]
+    keys = ["raw", *(f"{s} {g}" for s in solvers for g in args.grammars)]
     tallies = {key: Tally() for key in keys}
     times = {key: [] for key in ["classifier", *keys[1:], *(f"{k} energy" for k in keys[1:])]}
     for fold in range(args.folds) if args.only is None else args.only:
@@ -105,10 +104,10 @@ def main():
         for pair in test:
             measure(pair, classifier, plans, not args.no_walk, tallies, times)
         print(f"after fold {fold}, {tallies['raw'].pictures} pictures:", flush=True)
-        report(tallies, times)
+        report(tallies, times, args.grammars)
 
 
-def report(tallies, times):
+def report(tallies, times, grammars):
     print(f"{'':24} acc7   acc8   mIoU7  mIoU8  F1 win rows  cols   s/image  recall by class")
     for key, tally in tallies.items():
         recall = " ".join(f"{v:.2f}" for v in tally.recall(fold_chimney=True))
@@ -119,7 +118,7 @@ def report(tallies, times):
             f"{tally.rows_right():.3f} {tally.columns_right():.3f}  {spent:.3f}    {recall}"
         )
     print("classes:", " ".join(LABELS[1:8]))
-    for grammar in GRAMMARS:
+    for grammar in grammars:
         exact, walked = (np.array(times.get(f"{s} {grammar} energy", [])) for s in ("dp", "walk"))
         if len(walked):
             share = np.mean(exact <= walked + 1e-6)

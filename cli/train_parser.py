@@ -24,7 +24,7 @@ from . import _options
               help="Stages of auto-context; the last two see the picture itself.")  # fmt: skip
 @click.option("--rounds", type=click.IntRange(1, 2000), default=80, show_default=True,
               help="Trees a class of the last two stages.")  # fmt: skip
-@click.option("--pixels", type=click.IntRange(10, 10**6), default=1300, show_default=True,
+@click.option("--pixels", type=click.IntRange(10, 10**6), default=2000, show_default=True,
               help="Pixels sampled a picture, variant and stage.")  # fmt: skip
 @click.option("--height", type=click.IntRange(32, 2000), default=576, show_default=True,
               help="Working resolution: rows of a picture, pixels.")  # fmt: skip

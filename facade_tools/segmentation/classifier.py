@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..artifacts.store import unreadable
 from ..errors import InvalidInput
-from ..imaging.features import Picture
+from ..imaging.features import Picture, blurred
 from ..imaging.features_context import Probabilities
 from ..imaging.image_io import fitted
 from .autocontext import run_stages
@@ -29,6 +29,7 @@ MAX_NODES = 20_000_000
 MAX_CLASSES = 100
 MAX_PIXELS = 400_000  # at working resolution
 KINDS = ("context", "patch")
+SMOOTH = 1.2  # pixels of the working picture
 
 _ARRAYS = {
     "feature": (np.int16, 1), "threshold": (np.uint8, 1), "child": (np.int32, 1),
@@ -62,6 +63,7 @@ class Classifier:
         """Return class probabilities (classes, height, width) of a picture at working size.
 
         Stages of context are asked about the picture and its mirror image: facades have no side.
+        Their belief is smoothed a little: single pixels are worth less than their neighbours.
         """
         if self.kind == "context":
             return self._both_ways(working)
@@ -77,8 +79,7 @@ class Classifier:
         mirrored = np.ascontiguousarray(working[:, ::-1])
         with ThreadPoolExecutor(2) as pool:  # compiled loops let go of the interpreter
             one, other = pool.map(believed, (working, mirrored))
-        mean: Probabilities = (one + other[:, :, ::-1]) / np.float32(2)
-        return mean
+        return np.stack([blurred(plane, SMOOTH) for plane in (one + other[:, :, ::-1]) / 2])
 
 
 def save(classifier: Classifier) -> bytes:

@@ -41,7 +41,7 @@ class TrainOptions:
     stages: int = 4
     height: int = 576
     coarse: int = 288
-    pixels: int = 1300
+    pixels: int = 2000
     inner: int = 2
     augment: int = 1
     balance: float = 0.0

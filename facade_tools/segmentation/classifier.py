@@ -29,7 +29,7 @@ MAX_NODES = 20_000_000
 MAX_CLASSES = 100
 MAX_PIXELS = 400_000  # at working resolution
 KINDS = ("context", "patch")
-SMOOTH = 1.2  # pixels of the working picture
+SMOOTH = 1 / 480  # of the working picture's rows
 
 _ARRAYS = {
     "feature": (np.int16, 1), "threshold": (np.uint8, 1), "child": (np.int32, 1),
@@ -79,7 +79,8 @@ class Classifier:
         mirrored = np.ascontiguousarray(working[:, ::-1])
         with ThreadPoolExecutor(2) as pool:  # compiled loops let go of the interpreter
             one, other = pool.map(believed, (working, mirrored))
-        return np.stack([blurred(plane, SMOOTH) for plane in (one + other[:, :, ::-1]) / 2])
+        mean = (one + other[:, :, ::-1]) / 2
+        return np.stack([blurred(plane, SMOOTH * len(plane)) for plane in mean])
 
 
 def save(classifier: Classifier) -> bytes:

@@ -86,7 +86,7 @@ def test_exported_trees_predict_what_lightgbm_does():
     rng = np.random.default_rng(0)
     codes = rng.integers(0, 256, (600, 7)).astype(np.uint8)
     labels = (codes[:, 0] > 90).astype(np.intp) + (codes[:, 3] > 200)
-    trees = train_boosted(codes, labels, np.ones(600, np.float32), 3, SMALL, seed=1)
+    trees = train_boosted([codes], labels, np.ones(600, np.float32), 3, SMALL, seed=1)
     settings = {
         "objective": "multiclass", "num_class": 3, "num_leaves": 8, "max_depth": 5,
         "learning_rate": SMALL.rate, "min_data_in_leaf": 5, "feature_fraction": SMALL.share,

@@ -30,7 +30,7 @@ EARLY_STRIDE = 3  # early stages only give context, which is smooth
 COARSE_PIXELS = 160_000
 FINE = 2  # stages that see the picture itself
 
-Fit = Callable[[Codes, NDArray[np.intp]], Trees]
+Fit = Callable[[Sequence[Codes], NDArray[np.intp]], Trees]
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,19 +126,31 @@ def train_stages(
     before: list[Probabilities | None] = [None] * len(examples)
     kept: list[Trees] = []
     for fit in fits[:-FINE]:
-        chosen = [sample_pixels(e.coarse_labels > 0, pixels, rng) for e in examples]
-        codes = [_codes(e, b, at) for e, b, at in zip(examples, before, chosen, strict=True)]
-        labels = [
-            e.coarse_labels.ravel()[at].astype(np.intp) - 1
-            for e, at in zip(examples, chosen, strict=True)
-        ]
-        kept.append(fit(np.concatenate(codes), np.concatenate(labels)))
-        models = _left_out(examples, codes, labels, fit)
-        before = [
-            predict(models[e.fold], features_of(e.coarse, b), EARLY_STRIDE)
-            for e, b in zip(examples, before, strict=True)
-        ]
+        trees, before = _coarse_stage(examples, before, fit, pixels, rng)
+        kept.append(trees)
     return (*kept, *_fine_stages(examples, before, fits[-FINE:], pixels, rng))
+
+
+def _coarse_stage(
+    examples: Sequence[Example],
+    before: Sequence[Probabilities | None],
+    fit: Fit,
+    pixels: int,
+    rng: np.random.Generator,
+) -> tuple[Trees, list[Probabilities | None]]:
+    """Return a stage, and its belief about each example from a model that did not see it."""
+    chosen = [sample_pixels(e.coarse_labels > 0, pixels, rng) for e in examples]
+    codes = [_codes(e, b, at) for e, b, at in zip(examples, before, chosen, strict=True)]
+    labels = [
+        e.coarse_labels.ravel()[at].astype(np.intp) - 1
+        for e, at in zip(examples, chosen, strict=True)
+    ]
+    models = _left_out(examples, codes, labels, fit)
+    after = [
+        predict(models[e.fold], features_of(e.coarse, b), EARLY_STRIDE)
+        for e, b in zip(examples, before, strict=True)
+    ]
+    return fit(codes, np.concatenate(labels)), list(after)
 
 
 def _codes(example: Example, before: Probabilities | None, at: NDArray[np.intp]) -> Codes:
@@ -156,9 +168,7 @@ def _left_out(
     models: dict[int, Trees] = {}
     for fold in sorted({e.fold for e in examples}):
         rest = [i for i, e in enumerate(examples) if e.fold != fold]
-        models[fold] = fit(
-            np.concatenate([codes[i] for i in rest]), np.concatenate([labels[i] for i in rest])
-        )
+        models[fold] = fit([codes[i] for i in rest], np.concatenate([labels[i] for i in rest]))
     return models
 
 
@@ -176,7 +186,7 @@ def _fine_stages(
         code, label = _in_doubt(example, planes, pixels, rng)
         codes.append(code)
         labels.append(label)
-    yield fits[0](np.concatenate(codes), np.concatenate(labels))
+    yield fits[0](codes, np.concatenate(labels))
     if len(fits) == 1:
         return
     models = _left_out(examples, codes, labels, fits[0])
@@ -185,7 +195,7 @@ def _fine_stages(
         first = finished(models[example.fold], planes)
         again = planes_again(example.picture, first)
         codes[i], labels[i] = _in_doubt(example, again, pixels, rng)
-    yield fits[1](np.concatenate(codes), np.concatenate(labels))
+    yield fits[1](codes, np.concatenate(labels))
 
 
 def _in_doubt(

@@ -100,7 +100,7 @@ def train(pairs: Sequence[Pair], options: TrainOptions, *, rng: np.random.Genera
     examples = list(_examples(small, options, rng))
     seed = int(rng.integers(2**31))
 
-    def fit(boost: BoostOptions, codes: Codes, labels: NDArray[np.intp]) -> Trees:
+    def fit(boost: BoostOptions, codes: Sequence[Codes], labels: NDArray[np.intp]) -> Trees:
         weights = class_weights(labels, len(classes), options.balance)
         return train_boosted(codes, labels, weights, len(classes), boost, seed=seed)
 

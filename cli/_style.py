@@ -51,6 +51,7 @@ def run_capture(model: str, output: str, options: CaptureOptions, unit: str) -> 
         "bottom": options.bottom,
         "top": options.top,
         "window_size": options.window,
+        "thickness": options.thickness,
         "unit": unit,
     }
     provenance = Provenance("capture-style", None, recorded, (digest(model),))

@@ -45,6 +45,12 @@ def _azimuth(_: click.Context, parameter: click.Parameter, value: str) -> float 
     help="Objective window size, metres: shorter sections are merged. Default: the median found.",
 )
 @click.option(
+    "--thickness",
+    type=click.FloatRange(0),
+    help="Depth of walls from their outer to their inner boundary, metres: how much of them an "
+    "overhang may thin. Default: the depth of their relief.",
+)
+@click.option(
     "--up",
     type=click.Choice(["auto", "y", "z"]),
     default="auto",
@@ -65,6 +71,7 @@ def command(
     bottom: int | None,
     top: int | None,
     window_size: float | None,
+    thickness: float | None,
     up: str,
     unit: str,
 ) -> None:
@@ -82,4 +89,5 @@ def command(
 
     if output is None:
         raise click.UsageError("Missing option '-o': name the style sheet's folder.")
-    run_capture(model, output, CaptureOptions(front, up, bottom, top, window_size), unit)
+    options = CaptureOptions(front, up, bottom, top, window_size, thickness)
+    run_capture(model, output, options, unit)

@@ -386,3 +386,14 @@ def test_what_no_page_can_hold_goes_on_several_in_full_resolution(styles, monkey
         (ux, uy), (vx, vy) = (np.moveaxis(texels[:, k] - texels[:, 0], -1, 0) for k in (1, 2))
         share = 0.5 * np.abs(ux * vy - uy * vx).sum() / wall_area(mesh)
         assert share == pytest.approx((2 * style.sheet.resolution) ** 2, rel=0.05)
+
+
+def test_thickness_of_walls_can_be_given():
+    sheet = capture_style(BOX, "x", CaptureOptions(thickness=0.6)).sheet
+    found = [wall.thickness.inner - wall.thickness.outer for wall in sheet.walls]
+    assert found == pytest.approx([0.6] * 4)
+
+
+def test_the_front_of_a_court_is_its_open_side(styles):
+    """The walls inside the court face left and right, but nobody sees them from there."""
+    assert styles["u-court"].sheet.front == 180.0

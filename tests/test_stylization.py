@@ -18,6 +18,7 @@ from facade_tools.stylization.atlas import painted, planned
 from facade_tools.stylization.bases import building_blocks
 from facade_tools.stylization.capture import capture_style
 from facade_tools.stylization.framing import standard_view
+from facade_tools.stylization.groups import group_rule
 from facade_tools.stylization.model import CaptureOptions
 from facade_tools.stylization.outline import wall_faces
 from facade_tools.stylization.projection import texel_density
@@ -25,7 +26,9 @@ from facade_tools.stylization.remesh import slabs
 from facade_tools.stylization.resizing import resized
 from facade_tools.stylization.retarget import Style, retarget
 from facade_tools.stylization.roles import SeenTier, tier_roles
+from facade_tools.stylization.splitting import SplitRule
 from facade_tools.stylization.structure import chosen_style
+from facade_tools.stylization.synthesis import synthesised
 
 WIDTH, DEPTH, HEIGHT = 20.0, 12.0, 15.0
 PIXELS = 10  # a metre
@@ -342,3 +345,42 @@ def test_a_tampered_sheet_is_refused(facade, tmp_path, shared_data):
         done = facade("retarget", out, out / "blocks.json", "-o", tmp_path / "x.glb")
         assert done.returncode == 3, done.stderr
         assert b"stylesheet.json" in done.stderr
+
+
+# --- fainter windows, plain walls -----------------------------------------------------------------
+def bands(*colours_and_metres, density=20):
+    """A picture of horizontal bands 6 m wide, a window of the colour in its middle third."""
+    rows = []
+    for colour, metres in colours_and_metres:
+        row = np.full((round(metres * density), 6 * density, 3), 215, dtype=np.uint8)
+        row[:, 2 * density : 4 * density] = colour
+        rows.append(row)
+    return np.concatenate(rows)
+
+
+def test_a_pale_upper_pane_belongs_to_its_window():
+    """Dark panes alone are insertable in one pass; a cut between the panes would show."""
+    storey = [(215, 0.7), (185, 1.0), (30, 1.0), (215, 0.3)]
+    rule = group_rule([bands(*storey * 4)], 12.0, 1)
+    assert rule.insertable == pytest.approx([2.0] * 4, abs=0.2)
+
+
+def test_pale_windows_beside_a_dark_bay_are_found():
+    storey = np.full((60, 400, 3), 215, dtype=np.uint8)
+    storey[20:40, 190:210] = 20
+    for left in (*range(20, 180, 40), *range(230, 390, 40)):
+        storey[20:40, left : left + 20] = 170
+    rule = group_rule([storey], 20.0, 0)
+    assert len(rule.insertable) == 9
+
+
+def test_a_wall_too_low_for_windows_shows_none():
+    """What frames windows reaches into the walls between them: a plain face leaves it out."""
+    picture = np.full((100, 60, 3), 200, dtype=np.uint8)
+    picture[30:70, 20:40] = 20
+    picture[24:30, 16:44] = 90  # a lintel wider than the window
+    rules = SplitRule((1.0, 1.0), (1.0,)), SplitRule((0.9, 0.9), (3.2,))
+    low = synthesised(picture, rules, (3.0, 5.0), (3.0, 1.5), 20.0)
+    assert low.min() == 200
+    narrow = synthesised(picture, rules, (3.0, 5.0), (0.6, 5.0), 20.0)
+    assert narrow.min() == 200

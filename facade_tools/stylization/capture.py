@@ -50,7 +50,7 @@ def capture_style(mesh: TexturedMesh, identity: str, options: CaptureOptions) ->
     low = np.min([part.low for part in model.parts], axis=0)[:2]
     high = np.max([part.high for part in model.parts], axis=0)[:2]
     pictures["textures/roof.png"] = top_picture(model.standard.mesh, low, high, model.density)
-    return Capture(_sheet(model, dressed), model.blocks, pictures)
+    return Capture(_sheet(model, dressed, options.thickness), model.blocks, pictures)
 
 
 def _file(index: int) -> str:
@@ -107,7 +107,7 @@ def _dress_seam(
     dressed.columns.append(number)
 
 
-def _sheet(model: Model, dressed: _Dressed) -> StyleSheet:
+def _sheet(model: Model, dressed: _Dressed, thickness: float | None) -> StyleSheet:
     standard, parts = model.standard, model.parts
     firsts = np.cumsum([0, *(len(part.plans) for part in parts)]).tolist()
     lost = standard.oblique + standard.sloped
@@ -126,7 +126,7 @@ def _sheet(model: Model, dressed: _Dressed) -> StyleSheet:
             for plan in part.plans.values()
         ),
         tuple(
-            _wall(side, i, first, part, dressed)
+            _wall(side, i, first, part, dressed, thickness)
             for i, (part, first) in enumerate(zip(parts, firsts, strict=False))
             for side in WALL_SIDES
         ),
@@ -175,7 +175,9 @@ def _floor(slab: Slab, block: int, part: Part) -> StyleFloor:
     )
 
 
-def _wall(side: Side, block: int, first: int, part: Part, dressed: _Dressed) -> Wall:
+def _wall(
+    side: Side, block: int, first: int, part: Part, dressed: _Dressed, thickness: float | None
+) -> Wall:
     """Return a wall; first: number of its block's lowest floor."""
     along, direction, depth, sign = SIDES[side]
     faces = dressed.faces
@@ -200,7 +202,8 @@ def _wall(side: Side, block: int, first: int, part: Part, dressed: _Dressed) -> 
         )
         for i in own
     )
-    return Wall(f"block-{block}", side, Thickness(min(depths), max(depths)), lines, styled)
+    inner = max(depths) if thickness is None else min(depths) + thickness
+    return Wall(f"block-{block}", side, Thickness(min(depths), inner), lines, styled)
 
 
 def _depths(part: Part, axis: int, sign: int) -> list[float]:

@@ -17,6 +17,8 @@ ALONG = 0.3  # of the textured area: pictures that stand along y
 ALIGNED = math.cos(math.radians(10))
 REFUSED = 0.6  # share of area that no Manhattan model can stand for
 WORTH_SAYING = 0.05
+SAMPLES, CELLS = 20_000, 40  # points and cells by which hidden walls are told
+NEAR = 0.15  # of the depth: relief that hides nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +67,7 @@ def standard_view(mesh: TexturedMesh, front: float | None = None, up: str = "aut
     frame = np.eye(4)
     frame[:3, :3], frame[:3, 3] = view.T, view.T @ shift
     placed = replace(mesh, vertices=turned - shift)
-    azimuth = (math.degrees(turn) * -1 + 180) % 360
+    azimuth = round(180 - math.degrees(turn), 9) % 360
     oblique, sloped = _shares(normals @ view.T, area)
     _refuse(oblique + sloped)
     return Standard(placed, frame, azimuth, oblique, sloped)
@@ -135,12 +137,37 @@ def _quarter(mesh: TexturedMesh, vectors: Points3, turn: float, front: float | N
     weights = _texture_weights(mesh)
     scores = []
     for quarter in turns:
-        outward = _rotation(turn + quarter) @ np.array([0.0, -1.0, 0.0])
-        along = vectors @ outward
+        view = _rotation(-(turn + quarter))
+        along = -(vectors @ view.T)[:, 1]
         facing = along > ALIGNED * np.linalg.norm(vectors, axis=1)
-        scores.append(float(along[facing] @ weights[facing]))
+        corners = (mesh.vertices @ view.T)[mesh.faces[facing]]
+        scores.append(_seen(corners, along[facing], weights[facing]))
     best = max(scores)
-    return next(q for q, score in zip(turns, scores, strict=True) if score >= 0.99 * best)
+    return next(q for q, score in zip(turns, scores, strict=True) if score >= 0.97 * best)
+
+
+def _seen(corners: Floats, areas: Floats, weights: Floats) -> float:
+    """Return the weighted area of the triangles (m, 3, 3) that is seen from −y.
+
+    Points spread over the triangles are seen where none lies before them: walls that a wing hides
+    (the sides of a court) do not speak for their direction.
+    """
+    if not len(corners):
+        return 0.0
+    counts = np.ceil(SAMPLES * areas / areas.sum()).astype(np.int64)
+    owner = np.repeat(np.arange(len(corners)), counts)
+    number = np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts) + 0.5
+    u, v = np.modf(number * 0.7548776662466927)[0], np.modf(number * 0.5698402909980532)[0]
+    u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
+    a, b, c = (corners[owner, k] for k in range(3))
+    points = a + u[:, None] * (b - a) + v[:, None] * (c - a)
+    low, size = points.min(axis=0), np.maximum(np.ptp(points, axis=0), 1e-9)
+    cells = np.minimum((CELLS * (points - low) / size).astype(np.int64), CELLS - 1)
+    cell = cells[:, 0] * CELLS + cells[:, 2]
+    nearest = np.full(CELLS * CELLS, math.inf)
+    np.minimum.at(nearest, cell, points[:, 1])
+    seen = points[:, 1] < nearest[cell] + NEAR * size[1] + 0.1
+    return float(((areas * weights / counts)[owner])[seen].sum())
 
 
 def _texture_weights(mesh: TexturedMesh) -> Floats:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -20,6 +21,12 @@ LEAST_WINDOW = 0.3  # m
 LEAST_CONTRAST = 0.03  # of colours in 0..1
 NOISE = 0.7  # variance of walls over that of windows, above which there are no windows
 LUMPED = 1.6  # periods in one section
+FRAGMENT = 0.5  # of the usual section: twice what is merged
+MULLION = 0.8  # m: twice the gap within a window that is closed
+LEAST_WALL = 0.08  # of a face, that has to stay scalable
+PLAINER = 0.45  # of the variance that was left: what a pass has to leave that finds no more
+WIDER = 1.25  # times what was insertable: a pass that finds no more is to add more than edges
+PASSES = 4  # in which fainter and fainter windows are looked for
 MAX_AVERAGED = 64  # faces of a group that its mean texture is taken over
 
 
@@ -104,16 +111,54 @@ def group_rule(
     """
     mean = mean_picture(pictures, axis)
     signal = variance_signal(mean, axis)
-    labels = insertable_labels(signal)
-    place = size / len(labels)
+    place = size / len(signal)
     length = period(profile(mean, axis, size), size) if size > 2 * SHORTEST else None
-    if not _telling(signal, labels, mean, axis):
-        labels = np.zeros_like(labels)
-    least = max(_median_run(labels), LEAST_WINDOW / place) if window is None else window / place
-    labels = merged(labels, least)
+    labels = _windows(signal, mean, axis, place, window)
     if length is not None and _longest_run(labels) * place > LUMPED * length:
         labels = periodic_labels(signal, length / place)
     return rule_of(labels, size)
+
+
+def _windows(
+    signal: Floats, mean: Floats, axis: int, place: float, window: float | None
+) -> Booleans:
+    """Return the labels of eq. 3 to 5, merged; then of what they leave, while that finds more.
+
+    Windows that differ less from the wall than others (pale panes beside a coloured bay, the
+    upper halves above balconies) vanish beside the strongest in one pass. A further pass counts
+    if it finds more sections, or as many and what it leaves varies far less, and if enough wall
+    is left to stretch. place: metres.
+    """
+    raw = np.zeros(len(signal), dtype=bool)
+    found = raw
+    rest = math.inf
+    for _ in range(PASSES):
+        left = np.flatnonzero(~raw)
+        if len(left) < 2 or signal[left].max() <= 0:
+            break
+        labels = insertable_labels(signal[left] / signal[left].max())
+        if not _telling(signal[left], labels, mean[:, left] if axis == 0 else mean[left], axis):
+            break
+        raw = raw.copy()
+        raw[left[labels]] = True
+        more, left_over = _merged(raw, place, window), float(signal[~raw].mean())
+        gained = _sections(more) - _sections(found)
+        plainer = left_over < PLAINER * rest and more.sum() > WIDER * found.sum()
+        enough = more.mean() <= 1 - LEAST_WALL or not found.any()
+        if enough and (gained > 0 or (gained == 0 and plainer)):
+            found, rest = more, left_over
+    return found
+
+
+def _merged(labels: Booleans, place: float, window: float | None) -> Booleans:
+    if window is not None:
+        return merged(labels, window / place)
+    least = max(FRAGMENT * _median_run(labels), LEAST_WINDOW / place)
+    return merged(labels, least, min(least, MULLION / place))
+
+
+def _sections(labels: Booleans) -> int:
+    return int((np.diff(labels.astype(np.int8), prepend=0) == 1).sum())
 
 
 def _telling(signal: Floats, labels: Booleans, mean: Floats, axis: int) -> bool:

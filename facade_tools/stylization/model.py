@@ -31,7 +31,8 @@ class CaptureOptions:
     """Choices of a capture; None means: find it.
 
     front: azimuth of the front's normal, degrees. up: auto, y or z. bottom, top: number of tiers
-    of blocks that belong to the bottom and the top. window: objective window size (m).
+    of blocks that belong to the bottom and the top. window: objective window size (m). thickness:
+    of walls (m), from the outer to the inner boundary; None: as deep as their relief.
     """
 
     front: float | None = None
@@ -39,6 +40,7 @@ class CaptureOptions:
     bottom: int | None = None
     top: int | None = None
     window: float | None = None
+    thickness: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

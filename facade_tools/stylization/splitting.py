@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..geometry.arrays import Booleans, Floats
 
 SMOOTHNESS = 0.025  # λ of eq. 3
-CROWDED = 0.8  # S_r below this: more windows fit than look right
+CROWDED = 0.9  # S_r below this: more windows fit than look right
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,17 +102,17 @@ def _least_path(cost: Floats, smoothness: float) -> Booleans:
     return labels
 
 
-def merged(labels: Booleans, least: float) -> Booleans:
+def merged(labels: Booleans, least: float, gap: float | None = None) -> Booleans:
     """Drop insertable runs shorter than half of `least` places: fragments of a window, or noise.
 
-    A gap shorter than that between two insertable runs is closed first, so that a window with a
-    mullion stays one window.
+    A gap shorter than half of `gap` (if not given, of `least`) between two insertable runs is
+    closed first, so that a window with a mullion stays one window.
     """
     out = labels.copy()
-    for value in (False, True):
+    for value, limit in ((False, least if gap is None else gap), (True, least)):
         for start, end in _runs(out, value):
             inside = value or (start > 0 and end < len(out))
-            if end - start < least / 2 and inside:
+            if end - start < limit / 2 and inside:
                 out[start:end] = not value
     return out
 
@@ -135,8 +135,8 @@ def rule_of(labels: Booleans, size: float) -> SplitRule:
 def split(rule: SplitRule, size: float) -> Split:
     """Cut a face of `size` metres: repeat insertable sections, scale the others (eq. 8 and 9).
 
-    Eq. 8 packs as many windows as fit. Where the scalable sections would be squeezed below 80% or
-    stretched beyond 125%, the number of windows whose |log S_r| is least is taken instead. Windows
+    Eq. 8 packs as many windows as fit. Where the scalable sections would be squeezed below 90% or
+    stretched beyond 111%, the number of windows whose |log S_r| is least is taken instead. Windows
     keep their size, unless the rule has no walls at all.
     """
     if not rule.insertable:

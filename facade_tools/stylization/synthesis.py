@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 
 import cv2
 import numpy as np
@@ -11,9 +13,10 @@ from numpy.typing import NDArray
 from ..compiled import compiled
 from ..geometry.arrays import Floats, Integers
 from ..imaging.image_io import Picture
-from .splitting import Split, SplitRule, split
+from .splitting import SplitRule, split, variance_signal
 
-CLEAR = 0.2  # of a wall beside windows, that a face without windows leaves out at either end
+PLAIN = 0.5  # of a wall beside windows, that a face without windows is made of
+TOLERATED = 0.1  # stretch of a texture in which no windows were found
 SMEARED = 2.0  # stretch of walls beyond which their texture repeats
 Part = tuple[tuple[float, float], tuple[float, float]]  # shares: left and right, top and bottom
 WHOLE: Part = ((0.0, 1.0), (0.0, 1.0))
@@ -31,39 +34,74 @@ def resized_rule(rule: SplitRule, size: float) -> SplitRule:
     )
 
 
-def positions(rule: SplitRule, source: float, target: float, pixels: int) -> Floats:
+def positions(
+    rule: SplitRule,
+    source: float,
+    target: float,
+    pixels: int,
+    signal: Callable[[], Floats] | None = None,
+) -> Floats:
     """Return for every pixel across the new face the place in the old one, as a share 0..1.
 
-    source, target: sizes (m) of the face before and after. Equal sizes give the identity.
+    source, target: sizes (m) of the face before and after. Equal sizes give the identity; a face
+    without windows keeps its scale and goes on to and fro. signal:
+    gives the variance signal of the old face, by which one too small for windows finds plain wall.
     """
     centres = (np.arange(pixels) + 0.5) / pixels * target
+    if not rule.insertable and abs(target / source - 1) > TOLERATED:
+        return np.abs((centres / source + 1) % 2 - 1)
     own = resized_rule(rule, source)
     done = split(own, target)
     borders = np.concatenate([[0.0], np.cumsum(done.sizes)])
     section = np.clip(np.searchsorted(borders, centres, side="right") - 1, 0, len(done.sizes) - 1)
+    share = (centres - borders[section]) / np.maximum(np.diff(borders)[section], 1e-12)
     widths = np.empty(2 * len(own.insertable) + 1)
     widths[::2], widths[1::2] = own.scalable, own.insertable
     starts = np.concatenate([[0.0], np.cumsum(widths)])[:-1]
+    if own.insertable and not done.windows and signal is not None:
+        first, width = _plainest(starts[::2], widths[::2], source, signal())
+        share = _to_and_fro(share, target / max(width, 1e-9))
+        return np.asarray(np.clip((first + share * width) / source, 0.0, 1.0))
     index = np.array(done.sources)[section]
-    share = (centres - borders[section]) / np.maximum(np.diff(borders)[section], 1e-12)
-    share = _unsmeared(share, done, section, bool(own.insertable))
+    wall = index % 2 == 0
+    share = np.where(wall, _to_and_fro(share, done.stretch), share)
     places: Floats = np.clip((starts[index] + share * widths[index]) / source, 0.0, 1.0)
     return places
 
 
-def _unsmeared(share: Floats, done: Split, section: Integers, framed: bool) -> Floats:
+def _plainest(starts: Floats, widths: Floats, source: float, signal: Floats) -> tuple[float, float]:
+    """Return start and width (m) of the part of the walls that varies least.
+
+    starts, widths (k,): of the walls (m). What frames windows reaches into the walls beside them.
+    """
+    place = source / len(signal)
+    total = np.concatenate([[0.0], np.cumsum(signal)])
+    best = (math.inf, 0.0, source)
+    for start, width in zip(starts.tolist(), widths.tolist(), strict=True):
+        if width < 0.5 * widths.max():
+            continue
+        count = max(1, int(PLAIN * width / place))
+        low, high = int(start / place), max(int((start + width) / place), int(start / place) + 1)
+        firsts = np.arange(low, max(high - count, low) + 1)
+        firsts = firsts[firsts + count < len(total)]
+        if len(firsts):
+            # a place more at either end: pixels mix with their neighbours
+            ends = np.minimum(firsts + count + 1, len(signal)), np.maximum(firsts - 1, 0)
+            means = (total[ends[0]] - total[ends[1]]) / count
+            k = int(np.argmin(means))
+            best = min(best, (float(means[k]), float(firsts[k]) * place, count * place))
+    return best[1], best[2]
+
+
+def _to_and_fro(share: Floats, stretch: float) -> Floats:
     """Run through much stretched walls to and fro instead of smearing their pixels.
 
     An odd number of runs begins and ends like the section itself.
     """
-    if not done.windows:  # a plain face: what frames the windows stays off its edges
-        share = CLEAR + (1 - 2 * CLEAR) * share if framed else share
-    if not SMEARED < done.stretch < math.inf:
+    if not SMEARED < stretch < math.inf:
         return share
-    runs = 2 * round((done.stretch - 1) / 2) + 1
-    wall = np.array(done.sources)[section] % 2 == 0
-    to_and_fro = np.abs((share * runs + 1) % 2 - 1)
-    return np.where(wall, to_and_fro, share)
+    runs = 2 * round((stretch - 1) / 2) + 1
+    return np.abs((share * runs + 1) % 2 - 1)
 
 
 def synthesised(
@@ -79,15 +117,22 @@ def synthesised(
     rules: for columns (left to right) and for rows (top to bottom). source, target: width and
     height (m) before and after. density: pixels a metre of the result. part: what is wanted of it.
     """
-    places = [
-        positions(rule, old, new, _pixels(new, density)) * size - 0.5
-        for rule, old, new, size in zip(rules, source, target, picture.shape[1::-1], strict=True)
-    ]
+    places = []
+    for k in (0, 1):
+        count, signal = _pixels(target[k], density), partial(_signal, picture, k)
+        share = positions(rules[k], source[k], target[k], count, signal)
+        places.append(share * picture.shape[1 - k] - 0.5)
     columns, rows = (p[_cut(*ends, len(p))] for p, ends in zip(places, part, strict=True))
     order = ((rows, 0), (columns, 1)) if len(rows) < picture.shape[0] else ((columns, 1), (rows, 0))
     for line, axis in order:  # first the one that leaves less to the other
         picture = _resampled(picture, line, axis)
     return picture
+
+
+def _signal(picture: Picture, axis: int) -> Floats:
+    """Return the variance signal of a picture, thinned to at most 256 lines."""
+    step = max(1, picture.shape[axis] // 256)
+    return variance_signal(picture[::step] if axis == 0 else picture[:, ::step], axis)
 
 
 def shape_of(target: tuple[float, float], density: float, part: Part = WHOLE) -> tuple[int, int]:

@@ -20,9 +20,11 @@ from .score import cheeseman_stutz
 from .structure_search import Search, Tried
 
 TOGETHER = Stop(relative=1e-5, iterations=40)
-PROPOSALS = 3  # that may fail one after the other
+TRIAL = Stop(relative=1e-5, iterations=8)
+HOPE = 15.0  # nats by which a proposal may be worse after its trial
+PROPOSALS = 3  # of a group that are tried before it is left alone
 CLEAR = 3.0  # standard errors from which a correlation counts
-DOUBT = 10.0  # nats by which a proposal may look worse before EM has adapted to it
+DOUBT = 50.0  # nats by which a proposal may look worse before EM has adapted to it
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,9 +35,9 @@ class Joint:
     score: float
 
 
-def joint(search: Search, network: Network) -> Joint:
+def joint(search: Search, network: Network, stop: Stop = TOGETHER) -> Joint:
     """Return a network after EM together; the configuration counts as tried."""
-    fit = run(network, search.data, search.prior, weights=search.weights, stop=TOGETHER)
+    fit = run(network, search.data, search.prior, weights=search.weights, stop=stop)
     score = cheeseman_stutz(fit.network, search.data, search.weights, fit.posterior, search.prior)
     families = fit.network.families
     sizes = tuple(len(family.coef) for family in families)
@@ -44,28 +46,39 @@ def joint(search: Search, network: Network) -> Joint:
     return Joint(fit, score)
 
 
+def trial(search: Search, network: Network, best: Joint) -> Joint:
+    """Return a network after a few iterations together; after all where there is hope."""
+    after = joint(search, network, TRIAL)
+    if after.score < best.score - HOPE:
+        return after
+    return joint(search, after.fit.network)
+
+
 def settled_together(search: Search, network: Network) -> Joint:
     """Change single lateral edges and sizes while the score after EM together rises."""
     best = joint(search, network)
     if not search.limits.lateral:
         return best
-    best = settled_edges(search, best)
+    failed: set[tuple[int, Inputs]] = set()
+    best = settled_edges(search, best, failed)
     grown = settled_sizes(search, best)
-    return best if grown is best else settled_edges(search, grown)
+    if grown is best:
+        return best
+    pairs = zip(grown.fit.network.families, best.fit.network.families, strict=True)
+    resized = {g for g, (a, b) in enumerate(pairs) if len(a.coef) != len(b.coef)}
+    return settled_edges(search, grown, {(g, inputs) for g, inputs in failed if g not in resized})
 
 
-def settled_edges(search: Search, best: Joint) -> Joint:
-    """Add and drop single lateral edges while the score rises.
+def settled_edges(search: Search, best: Joint, failed: set[tuple[int, Inputs]]) -> Joint:
+    """Add and drop single lateral edges while the score rises; `failed` takes what did not help.
 
     A group with too few clusters borrows an edge that tells them apart: one that cannot be dropped
     may be with a cluster more.
     """
     options = admissible(search.data, search.weights, search.layout)
-    failed: set[tuple[int, Inputs]] = set()
     while True:
-        proposals = [p for p in ranked(search, best.fit, options) if p not in failed]
-        for g, inputs in proposals[:PROPOSALS]:
-            after = joint(search, proposed(search, best.fit, g, inputs))
+        for g, inputs in promising(search, best.fit, options, failed):
+            after = trial(search, proposed(search, best.fit, g, inputs), best)
             if len(inputs) < len(best.fit.network.families[g].inputs) and after.score < best.score:
                 after = grown(search, after, g)
             if after.score > best.score:
@@ -87,7 +100,7 @@ def grown(search: Search, best: Joint, g: int) -> Joint:
     """Return the network with a cluster more in group g if its score is higher."""
     if len(best.fit.network.families[g].coef) >= search.limits.largest:
         return best
-    after = joint(search, cut(search, best.fit, g))
+    after = trial(search, cut(search, best.fit, g), best)
     return after if after.score > best.score else best
 
 
@@ -107,6 +120,17 @@ def cut(search: Search, fit: Fit, g: int) -> Network:
     families = list(fit.network.families)
     families[g] = replace(fresh, hidden=hidden)
     return replace(fit.network, families=tuple(families))
+
+
+def promising(
+    search: Search, fit: Fit, options: list[dict[int, Inputs]], failed: set[tuple[int, Inputs]]
+) -> Iterator[tuple[int, Inputs]]:
+    """Yield the best `PROPOSALS` changes of each group that have not failed, best first."""
+    tried = [0] * len(options)
+    for g, inputs in ranked(search, fit, options):
+        if (g, inputs) not in failed and tried[g] < PROPOSALS:
+            tried[g] += 1
+            yield g, inputs
 
 
 def ranked(search: Search, fit: Fit, options: list[dict[int, Inputs]]) -> list[tuple[int, Inputs]]:
@@ -132,37 +156,39 @@ def ranked(search: Search, fit: Fit, options: list[dict[int, Inputs]]) -> list[t
 def changed(search: Search, fit: Fit, g: int, table: dict[int, Inputs]) -> Iterator[Inputs]:
     """Yield inputs of group g with a parent or a feature less, or a parent more.
 
-    A parent shows all that it can, or only the features that tell something.
+    A parent shows all that it can, only the features that tell something, or the one of them that
+    tells most.
     """
     owners = parent_of(search.layout)
     all_inputs = [family.inputs for family in fit.network.families]
     now = all_inputs[g]
     smaller = {tuple(f for f in now if owners[f] != parent) for parent in {owners[f] for f in now}}
     yield from sorted(smaller | {tuple(f for f in now if f != one) for one in now})
-    clear = telling(search, fit, g) if table else set()
+    z = telling(search, fit, g) if table else {}
     for parent, features in sorted(table.items()):
-        shown = {tuple(sorted({*now, *some})) for some in (features, clear & set(features))}
+        clear = [f for f in features if f in z and f not in now]
+        most = sorted(clear, key=lambda f: -z[f])[:1]
+        shown = {tuple(sorted({*now, *some})) for some in (features, clear, most)}
         for wider in sorted(shown - {now}) if parent >= 0 else ():
             after = (*all_inputs[:g], wider, *all_inputs[g + 1 :])
             if acyclic(after, search.layout) and not crowded(wider, search.data.groups[g]):
                 yield wider
 
 
-def telling(search: Search, fit: Fit, g: int) -> set[int]:
-    """Return the features that go with what group g's clusters leave over (|r| √n > `CLEAR`)."""
+def telling(search: Search, fit: Fit, g: int) -> dict[int, float]:
+    """Return the features that go with what group g's clusters leave over, and |r| √n > `CLEAR`."""
     family, data, features = fit.network.families[g], search.data.groups[g], search.data.features
     u = np.column_stack([np.ones(len(features)), inputs_of(family, features)])
     mean = np.einsum("nk,kdq,nq->nd", fit.posterior.clusters[g], family.coef, u, optimize=True)
     rest = np.where(data.dense, data.x - mean, 0.0)
-    out: set[int] = set()
+    most = np.zeros(features.shape[1])
     for i in range(rest.shape[1]):
         rows = data.dense[:, i] & (search.weights.groups[g] > 0)
         if rows.sum() > 2:
             shown = features[rows] - features[rows].mean(axis=0)
             size = np.sqrt((shown**2).sum(axis=0) * (rest[rows, i] ** 2).sum()) + NOTHING
-            z = np.abs(rest[rows, i] @ shown) / size * np.sqrt(rows.sum())
-            out |= set(np.flatnonzero(z > CLEAR).tolist())
-    return out
+            most = np.maximum(most, np.abs(rest[rows, i] @ shown) / size * np.sqrt(rows.sum()))
+    return {int(f): float(most[f]) for f in np.flatnonzero(most > CLEAR)}
 
 
 def proposed(search: Search, fit: Fit, g: int, inputs: Inputs) -> Network:

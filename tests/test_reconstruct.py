@@ -20,6 +20,7 @@ from facade_tools.reconstruction.engine import Lot
 from facade_tools.reconstruction.reconstruct import Ask, reconstruct
 from facade_tools.reconstruction.surfaces import largest_rectangle
 from facade_tools.reconstruction.texture_synthesis import cheapest_cut, joined, quilted
+from facade_tools.reconstruction.widening import widened
 
 from .judges import khronos_issues
 
@@ -308,3 +309,51 @@ def test_a_parse_on_a_buildings_mass(facade_here, rendered, tmp_path):
     assert [replace(box, roof=None) for box in one.boxes] == [
         replace(box, roof=None) for box in two.boxes
     ]
+
+
+# --- walls of other widths ------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("ratio", "columns"), [(0.7, 2), (1.05, 3), (1.35, 4), (2.0, 6), (4.0, 12)]
+)
+def test_axes_repeat_where_the_wall_is_wider(ratio, columns):
+    parse = parsed(regions=tuple(r for r in regions(roof=False) if r.label != "door"))
+    labels = label_map(parse)
+    more = widened(labels, ratio)
+    assert (more is None) == (columns == 3)
+    if more is None:
+        return
+    assert abs(np.log(more.width / (ratio * WIDTH))) < abs(np.log(ratio))
+    other, wide = more.parse(parse), more.picture(picture())
+    assert wide.shape == (HEIGHT, more.width, 3)
+    assert label_map(other).shape == (HEIGHT, more.width)
+    row = [r for r in other.regions if r.label == "window" and r.y0 == 60]
+    assert len(row) == columns
+    assert {r.x1 - r.x0 for r in row} == {12}
+    dark = (wide[65] < 90).all(axis=1)
+    assert all(dark[r.x0 + 1 : r.x1 - 1].all() for r in row)
+
+
+def test_doors_are_never_repeated_and_lone_axes_stretch():
+    labels = label_map(parsed())
+    more = widened(labels, 3.0)
+    if more is not None:
+        doors = [r for r in more.parse(parsed()).regions if r.label == "door"]
+        assert len(doors) == 1
+    assert widened(labels[:, :40], 3.0) is None
+    assert widened(np.full((50, 50), 2, np.uint8), 3.0) is None
+
+
+def test_a_wide_footprint_has_more_axes_and_nothing_is_seen_twice():
+    lot = Lot([np.array([[-15.0, -6.0], [15.0, -6.0], [15.0, 6.0], [-15.0, 6.0]])])
+    parse = parsed(regions=tuple(r for r in regions(roof=False) if r.label != "door"))
+    made = reconstruct(parse, picture(), [lot], rng=rng())
+    upper = [r for r in made.plan.openings if r.label == "window" and r.v0 > 8]
+    assert len(upper) > 6
+    assert not made.seen
+    assert solid_of(made.scene()).is_watertight
+    assert not list(building_problems(made.building()))
+    assert all(
+        not element.known
+        for piece in made.building().facades["front"].pieces
+        for element in piece.elements
+    )

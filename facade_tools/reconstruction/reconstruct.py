@@ -22,6 +22,7 @@ from .engine import Derived, Leaf, Lot, derive
 from .records import derivation_of
 from .specific import Cover, Design, Specific, specific_grammar
 from .surfaces import TILE_METRES, Surfaces, canvas_of, colors_of, surfaces_of
+from .widening import widened
 
 DEPTH = 12.0  # metres, of the default footprint
 
@@ -45,13 +46,17 @@ class Ask:
 
 @dataclass(frozen=True, slots=True)
 class Reconstruction:
-    """The elevation, the specific grammar, what it derives, and its textures."""
+    """The elevation, the specific grammar, what it derives, and its textures.
+
+    seen: no axis was added or left out, so that what stands on the front is what is in the picture.
+    """
 
     name: str
     plan: Elevation
     specific: Specific
     derived: Derived
     surfaces: Surfaces
+    seen: bool = True
 
     def scene(self) -> Scene:
         """Return the textured scene; `mass` is its closed solid."""
@@ -60,7 +65,9 @@ class Reconstruction:
 
     def building(self) -> Building:
         """Return the parametric building; what the front shows is known."""
-        made = derived_building(self.derived, self.name, self.plan.storey, ["front"])
+        made = derived_building(
+            self.derived, self.name, self.plan.storey, ["front"] if self.seen else []
+        )
         colors = self.surfaces.colors
         own = Colors(colors["wall"], "#efeae0", colors["roof"], colors["door"])
         return replace(made, colors=own)
@@ -81,15 +88,21 @@ def reconstruct(
     """Return the building of a parse on a footprint, by default a rectangle behind the facade.
 
     photo: the picture that was parsed, (h, w, 3). lots: outlines whose widest side to the front
-    (−y) is the parsed facade; a lot's height, where not 0, is that of its eaves. Raises
+    (−y) is the parsed facade, of which axes repeat or are left out where the wall is wider or
+    narrower; a lot's height, where not 0, is that of its eaves. Raises
     InvalidInput where the parse shows no building or the picture is another.
     """
     ask = ask or Ask()
     labels = label_map(parse)
     picture = _rectified(photo, parse, labels.shape)
     plan = elevation(parse, ask.storey_height, ask.height)
+    more = None
     if lots:
         width, top = _front(lots)
+        more = widened(labels, width / plan.width * (plan.eaves / top if top else 1.0))
+        if more is not None:
+            parse, picture = more.parse(parse), more.picture(picture)
+            labels, plan = label_map(parse), elevation(parse, ask.storey_height, ask.height)
         plan = stretched(plan, width, top)
     else:
         lots = [_rectangle(plan.width, ask.depth)]
@@ -98,7 +111,7 @@ def reconstruct(
     design = Design(_roof(plan, ask), surfaces.axes, ask.party, surfaces.colors)
     specific = specific_grammar(plan, design, parse.id)
     derived = derive(specific.grammar, lots, rng=rng)
-    return Reconstruction(parse.id, plan, specific, derived, surfaces)
+    return Reconstruction(parse.id, plan, specific, derived, surfaces, more is None)
 
 
 def _rectified(photo: Picture, parse: Parse, shape: tuple[int, ...]) -> Picture:

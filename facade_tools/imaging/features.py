@@ -132,6 +132,8 @@ def boxed(plane: Plane, size: tuple[int, int]) -> Plane:
 def shifted(plane: Plane, dx: int, dy: int) -> Plane:
     """Return the plane whose pixel (x, y) is the given one's (x + dx, y + dy); edges repeat."""
     height, width = plane.shape
-    rows = np.clip(np.arange(height) + dy, 0, height - 1)
-    columns = np.clip(np.arange(width) + dx, 0, width - 1)
-    return plane[rows[:, None], columns] if dx else plane[rows]
+    edges = (max(-dy, 0), max(dy, 0), max(-dx, 0), max(dx, 0))
+    wider = cv2.copyMakeBorder(np.ascontiguousarray(plane), *edges, cv2.BORDER_REPLICATE)
+    top, left = max(dy, 0), max(dx, 0)
+    moved = wider[top : top + height, left : left + width]
+    return moved.astype(np.float32, copy=False)

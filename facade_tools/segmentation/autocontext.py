@@ -20,6 +20,7 @@ from ..imaging.features_context import (
     context_features,
     repeated,
 )
+from ..imaging.features_fine import fine_features
 from ..imaging.image_io import fitted
 from .final import Planes, finished, planes_again, planes_of
 from .trees import Codes, Trees, softmax
@@ -93,10 +94,11 @@ def run_stages(stages: Sequence[Trees], picture: Picture, height: int, fine: int
     before: Probabilities | None = None
     for trees in stages[:-fine]:
         before = predict(trees, features_of(coarse, before), EARLY_STRIDE)
-    first = finished(stages[-fine], planes_of(picture, coarse, before))
+    edges = fine_features(picture)
+    first = finished(stages[-fine], planes_of(edges, coarse, before))
     if fine == 1:
         return first
-    second = finished(stages[-1], planes_again(picture, first))
+    second = finished(stages[-1], planes_again(edges, first))
     mean: Probabilities = (first + second) / np.float32(2)
     return mean
 
@@ -182,7 +184,7 @@ def _fine_stages(
     """Train on pixels that the stages before leave in doubt."""
     codes, labels = [], []
     for example, belief in zip(examples, before, strict=True):
-        planes = planes_of(example.picture, example.coarse, belief)
+        planes = planes_of(fine_features(example.picture), example.coarse, belief)
         code, label = _in_doubt(example, planes, pixels, rng)
         codes.append(code)
         labels.append(label)
@@ -191,9 +193,9 @@ def _fine_stages(
         return
     models = _left_out(examples, codes, labels, fits[0])
     for i, (example, belief) in enumerate(zip(examples, before, strict=True)):
-        planes = planes_of(example.picture, example.coarse, belief)
-        first = finished(models[example.fold], planes)
-        again = planes_again(example.picture, first)
+        edges = fine_features(example.picture)
+        first = finished(models[example.fold], planes_of(edges, example.coarse, belief))
+        again = planes_again(edges, first)
         codes[i], labels[i] = _in_doubt(example, again, pixels, rng)
     yield fits[1](codes, np.concatenate(labels))
 

@@ -18,7 +18,7 @@ from ..imaging.features_context import (
     context_features,
     repeated,
 )
-from ..imaging.features_fine import enlarged, fine_features
+from ..imaging.features_fine import enlarged
 from .trees import Codes, Trees, softmax
 
 CERTAIN = 0.98  # what the stages before believe more than this stays
@@ -61,23 +61,25 @@ class Planes:
         return np.ascontiguousarray(np.concatenate(parts).T)
 
 
-def planes_of(picture: Picture, coarse: Picture, before: Probabilities | None) -> Planes:
-    """Return what the first last stage sees: a picture, its coarse version and belief about it."""
-    low, fine = pixel_features(coarse), fine_features(picture)
+def planes_of(edges: Features, coarse: Picture, before: Probabilities | None) -> Planes:
+    """Return what the first last stage sees: the coarse picture and the belief about it too.
+
+    edges: the fine features of the picture.
+    """
+    low = pixel_features(coarse)
     if before is None:
-        return Planes(low, fine, None)
-    shape = picture.shape[:2]
+        return Planes(low, edges, None)
+    shape = edges.shape[1], edges.shape[2]
     belief = enlarged(before, shape)
     means = [belief_features(enlarged(one, shape)) for one in repeated(before)]
-    fine = np.concatenate([fine, belief_features(belief), *means])
+    fine = np.concatenate([edges, belief_features(belief), *means])
     return Planes(np.concatenate([low, context_features(before)]), fine, belief)
 
 
-def planes_again(picture: Picture, belief: Probabilities) -> Planes:
-    """Return what the second last stage sees: a picture and the belief of the first about it."""
+def planes_again(edges: Features, belief: Probabilities) -> Planes:
+    """Return what the second last stage sees: the belief of the first about the picture too."""
     means = [belief_features(one) for one in repeated(belief)]
-    fine = np.concatenate([fine_features(picture), context_features(belief), *means])
-    return Planes(None, fine, belief)
+    return Planes(None, np.concatenate([edges, context_features(belief), *means]), belief)
 
 
 def finished(trees: Trees, planes: Planes) -> Probabilities:

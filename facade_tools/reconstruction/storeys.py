@@ -232,7 +232,7 @@ def _bands(
 # What a row of windows must reach: shares of the median floor's agreement with the columns (of a
 # roof: of its evidence) and of its height.
 LEAST_SCORE = {"ground": 0.7, "floor": 0.15, "roof": 0.2}
-LEAST_HEIGHT = {"ground": 0.5, "floor": 0.4, "roof": 0.5}
+LEAST_HEIGHT = {"ground": 0.5, "floor": 0.25, "roof": 0.2}
 
 
 def _kept(bands: list[Band]) -> list[Band]:

@@ -145,7 +145,7 @@ def test_classifiers_learn_round_trip_and_are_the_same_again(kind, request, pair
     np.testing.assert_allclose(belief.sum(axis=0), 1, atol=1e-3)
     found = np.array([LABELS.index(name) for name in again.classes])[belief.argmax(axis=0)]
     known = pairs[0].labels > 0
-    assert (found == pairs[0].labels)[known].mean() > 0.6
+    assert (found == pairs[0].labels)[known].mean() > 0.5
 
 
 def test_training_is_deterministic(pairs):

@@ -57,6 +57,24 @@ def test_learn_sample_evaluate_in_a_pipe(facade_script, model, attributes):
     assert run(facade_script, "evaluate", model, attributes).returncode == 0
 
 
+def test_samples_do_not_depend_on_jobs_or_on_where_they_are_written(facade_script, folder, model):
+    """Runs of samples by two workers; a folder and a single file take them one by one."""
+    path = folder / "many.jsonl"
+    run(facade_script, "sample", model, "-n", 4100, "--jobs", 2, "-o", path)
+    alone = run(facade_script, "sample", model, "-n", 4100).stdout
+    assert path.read_bytes() == alone
+    assert [json.loads(line)["id"] for line in alone.splitlines()[4095:4097]] == [
+        "0-4095",
+        "0-4096",
+    ]
+    run(facade_script, "sample", model, "-n", 3, "-o", f"{folder}/apart/")
+    files = sorted((folder / "apart").iterdir())
+    assert [f.name for f in files] == ["0-0.json", "0-1.json", "0-2.json"]
+    assert b"".join(f.read_bytes() for f in files) == b"".join(alone.splitlines(True)[:3])
+    done = run(facade_script, "sample", model, "-n", 2, "-o", folder / "one.json", code=1)
+    assert b"several artifacts" in done.stderr
+
+
 def test_the_same_seed_learns_the_same_bytes(facade_script, folder, model, attributes):
     again = folder / "again.json"
     run(facade_script, "learn", attributes, "--variant", "no-lateral", "-o", again)

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from facade_tools.artifacts.attributes import Attributes, Bounds, ElementAttributes, Present
 from facade_tools.artifacts.documents import encode
@@ -23,6 +24,7 @@ from facade_tools.exteriors.prior import shipped_prior
 from facade_tools.exteriors.row_bytes import Row, joined, text_column
 from facade_tools.exteriors.sample_lines import sample_lines
 from facade_tools.exteriors.serialisation import network_of
+from facade_tools.exteriors.transforms import forward
 
 
 @pytest.fixture(scope="module")
@@ -137,6 +139,27 @@ def test_exact_conditioning_agrees_with_rejection(plain, houses):
         assert ours == pytest.approx(theirs, abs=4.5 * np.sqrt(0.25 / len(free)) + 0.03)
 
 
+def test_conditionals_equal_enumeration(plain):
+    """P(S | width) and E[depth | width] by summing over every S and H, and by drawing."""
+    network = network_of(plain)
+    group, scaling, family = network.layout.groups[0], network.scalings[0], network.families[0]
+    given = Attributes("g", mass=replace(Attributes("x").mass, bbox=(9.0, None, None)))
+    row = read_attributes([given], network.layout)
+    x = (forward(group.coordinates[0].transform, np.array([9.0]))[0][0] - scaling.center[0]) / (
+        scaling.scale[0]
+    )
+    mean, cov = family.coef[:, :, 0], family.cov
+    likelihood = norm.pdf(x, mean[:, 0], np.sqrt(cov[:, 0, 0]))
+    joint = network.style[:, None] * family.hidden * likelihood
+    expected = mean[:, 1] + cov[:, 1, 0] / cov[:, 0, 0] * (x - mean[:, 0])
+    drawn = draw_given(network, row, 40_000, rng=np.random.default_rng(0)).draws
+    share = np.bincount(drawn.style, minlength=len(joint)) / len(drawn.style)
+    assert share == pytest.approx(joint.sum(axis=1) / joint.sum(), abs=0.012)
+    depth = forward(group.coordinates[1].transform, drawn.readings.values[0][:, 1])[0]
+    found = (depth - scaling.center[1]) / scaling.scale[1]
+    assert found.mean() == pytest.approx((joint @ expected).sum() / joint.sum(), abs=0.03)
+
+
 def test_weighted_draws_average_to_the_density(model, plain, houses):
     """Where lateral parents are unobserved the weights' mean is the density; elsewhere each is."""
     network = network_of(plain)
@@ -186,6 +209,16 @@ def test_present_with_unknown_measures(model):
     for sample in draw(model, 20, given=given):
         assert sample.mass.garage[2] > 0
         assert sample.mass.porch[0] == (0.0,) * 6
+
+
+def test_floors_suit_low_eaves(model):
+    """Where the eaves are too low for two floors there is one, unless the second is given."""
+    low = replace(Attributes("x").mass, bbox=(None, None, 3.0))
+    assert {a.mass.arf[1] for a in draw(model, 100, given=Attributes("g", mass=low))} == {0.0}
+    two = replace(Attributes("x").mass, arf=(0.5, 0.5, 0.0))
+    for sample in draw(model, 100, given=Attributes("g", mass=two)):
+        assert sample.mass.arf == (0.5, 0.5, 0.0)
+        assert sample.mass.bbox[2] >= 3.45
 
 
 def test_far_without_floors_is_met(model):

@@ -22,7 +22,8 @@ from .style_pictures import StylePicture
 STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:70em;margin:2em auto;padding:0 1em;
 color:#222}h1,h2{font-weight:600}table{border-collapse:collapse}td,th{padding:.2em .8em;
 text-align:right;border-bottom:1px solid #ddd}td:first-child,th:first-child{text-align:left}
-figure{display:inline-block;margin:.5em}figcaption{font-size:13px;color:#555}svg{background:#fff}"""
+.columns{display:flex;flex-wrap:wrap;gap:0 3em}figcaption{font-size:13px;color:#555}
+figure{display:inline-block;margin:.5em;max-width:30em}svg{background:#fff}"""
 DATA, DRAWN = "#8aa4c8", "#c2553f"
 BINS = 24
 
@@ -41,11 +42,16 @@ def report_page(
     a picture is drawn as a glyph), marginals of data and samples, and the held-out table where
     there is one.
     """
+    columns = (
+        "<h2>Cardinalities</h2>" + cardinalities(model),
+        "<h2>Lateral edges</h2>" + figure(edge_graph(model), f"{len(model.edges)} edges"),
+        "<h2>Score</h2>" + figure(trace_graph(model.trace), score_caption(model)),
+    )
+    prior = escape(", ".join(model.unobserved)) or "nothing"
     parts = [
         f"<h1>Model of {model.count} buildings ({escape(model.variant)})</h1>",
-        cardinalities(model),
-        "<h2>Lateral edges</h2>" + figure(edge_graph(model), f"{len(model.edges)} edges"),
-        "<h2>Score</h2>" + figure(trace_graph(model.trace), "best Cheeseman-Stutz score so far"),
+        f"<div class='columns'>{''.join(f'<div>{column}</div>' for column in columns)}</div>",
+        f"<p>Not observed by any building, taken from the prior: {prior}.</p>",
     ]
     if comparison:
         parts.append("<h2>Held-out negative log-likelihood (nats a building)</h2>")
@@ -79,11 +85,17 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def cardinalities(model: Model) -> str:
-    """Return the table of cardinalities and what came from the prior."""
+    """Return the table of cardinalities."""
     rows = [(name, str(size)) for name, size in model.cardinalities.items()]
-    prior = ", ".join(model.unobserved) or "nothing"
-    note = f"<p>Not observed by any building, taken from the prior: {escape(prior)}.</p>"
-    return "<h2>Cardinalities</h2>" + table(("variable", "values"), rows) + note
+    return table(("variable", "values"), rows)
+
+
+def score_caption(model: Model) -> str:
+    """Return what the score trace shows."""
+    return (
+        f"best Cheeseman-Stutz score so far, a step each time that |S| changes; "
+        f"{len(model.search)} configurations tried"
+    )
 
 
 def held_out(comparison: Sequence[Comparison]) -> str:

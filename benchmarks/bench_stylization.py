@@ -35,8 +35,9 @@ from facade_tools.stylization.model import CaptureOptions
 from facade_tools.stylization.projection import SIDES, Palette, _rasterise, palette
 from facade_tools.stylization.remesh import section
 from facade_tools.stylization.resizing import resized
-from facade_tools.stylization.retarget import Style, retarget
+from facade_tools.stylization.retarget import retarget
 from facade_tools.stylization.splitting import SplitRule, split
+from facade_tools.stylization.style import Style
 
 SIZE, RAYS = 160, 4
 

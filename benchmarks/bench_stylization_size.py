@@ -18,7 +18,8 @@ from facade_tools.formats.mesh_reader import read_textured
 from facade_tools.formats.textured import TexturedMesh
 from facade_tools.stylization.capture import capture_style
 from facade_tools.stylization.model import CaptureOptions
-from facade_tools.stylization.retarget import Style, retarget
+from facade_tools.stylization.retarget import retarget
+from facade_tools.stylization.style import Style
 
 
 def finer(mesh: TexturedMesh) -> TexturedMesh:

@@ -26,8 +26,9 @@ from facade_tools.stylization.capture import capture_style
 from facade_tools.stylization.model import CaptureOptions
 from facade_tools.stylization.pitched import crowned
 from facade_tools.stylization.resizing import resized
-from facade_tools.stylization.retarget import Style, retarget
+from facade_tools.stylization.retarget import retarget
 from facade_tools.stylization.structure import chosen_style
+from facade_tools.stylization.style import Style
 
 from ._report import Progress
 from ._stream import file_name, is_folder

@@ -22,15 +22,22 @@ from facade_tools.formats.style_folder import write_style
 from facade_tools.formats.textured import joined
 from facade_tools.imaging.image_io import decoded
 from facade_tools.stylization.bases import layout_blocks, with_ends
+from facade_tools.stylization.bays import with_bays
 from facade_tools.stylization.capture import capture_style
 from facade_tools.stylization.drawing import sheet_picture
 from facade_tools.stylization.hull import layers, mass
 from facade_tools.stylization.model import CaptureOptions
 from facade_tools.stylization.panels import panels, reassigned, rectangles
-from facade_tools.stylization.placing import foreign_blocks, placed_blocks, placed_slabs
+from facade_tools.stylization.placing import (
+    foreign_blocks,
+    matched_blocks,
+    placed_blocks,
+    placed_slabs,
+)
 from facade_tools.stylization.remesh import Slab
 from facade_tools.stylization.resizing import resized
-from facade_tools.stylization.retarget import Style, retarget
+from facade_tools.stylization.retarget import retarget
+from facade_tools.stylization.style import Style
 from facade_tools.stylization.wings import wings
 
 SAMPLES = Path(__file__).parent.parent / "sample_data" / "textured"
@@ -397,3 +404,38 @@ def test_thickness_of_walls_can_be_given():
 def test_the_front_of_a_court_is_its_open_side(styles):
     """The walls inside the court face left and right, but nobody sees them from there."""
     assert styles["u-court"].sheet.front == 180.0
+
+
+# --- relief ---------------------------------------------------------------------------------------
+def niched():
+    """A wall of 18 m with three niches 2 m wide and 0.3 m deep, 2 m from its corners."""
+    parts = [textured_box((0, 0.3, 0), (18, 8, 6)), textured_box((0, 0, 4.5), (18, 0.3, 6))]
+    edges = [0.0, 2, 4, 8, 10, 14, 16, 18]
+    parts += [
+        textured_box((a, 0, 0), (b, 0.3, 4.5)) for a, b in zip(edges[::2], edges[1::2], strict=True)
+    ]
+    return style_of(joined(parts), front=180.0)
+
+
+def niches(style, blocks):
+    """Left and right ends (m) of the niches in the plan of the lowest slab."""
+    chosen = matched_blocks(style.sheet, style.blocks, blocks)
+    style, chosen = with_bays(style, chosen, blocks)
+    placed = placed_blocks(style.sheet, style.blocks, blocks, chosen)
+    slab = placed_slabs(style.sheet, placed[0])[0]
+    open_ = ~slab.cells[int(np.searchsorted(slab.ys, slab.ys[0] + 0.15)) - 1]
+    return [(a, b) for a, b, o in zip(slab.xs[:-1], slab.xs[1:], open_, strict=True) if o]
+
+
+@pytest.mark.parametrize(("factor", "count"), [(1.0, 3), (1.5, 4), (2.0, 6), (0.5, 1)])
+def test_niches_in_the_plan_are_repeated_and_keep_their_width(factor, count):
+    style = niched()
+    block = style.blocks.blocks[0]
+    blocks = resized(style.blocks, {block.id: (18 * factor, block.depth, block.height)})
+    found = niches(style, blocks)
+    assert len(found) == count
+    assert [b - a for a, b in found] == pytest.approx([2.0] * count, abs=0.05)
+    scene = retarget(style, blocks)
+    assert closed(scene.meshes[0])
+    front = next(m for m in scene.meshes if m.name == f"{block.id}/front")
+    assert wall_area(front) == pytest.approx(18 * factor * 6, rel=0.01)

@@ -24,10 +24,11 @@ from facade_tools.stylization.outline import wall_faces
 from facade_tools.stylization.projection import texel_density
 from facade_tools.stylization.remesh import slabs
 from facade_tools.stylization.resizing import resized
-from facade_tools.stylization.retarget import Style, retarget
+from facade_tools.stylization.retarget import retarget
 from facade_tools.stylization.roles import SeenTier, tier_roles
 from facade_tools.stylization.splitting import SplitRule
 from facade_tools.stylization.structure import chosen_style
+from facade_tools.stylization.style import Style
 from facade_tools.stylization.synthesis import synthesised
 
 WIDTH, DEPTH, HEIGHT = 20.0, 12.0, 15.0

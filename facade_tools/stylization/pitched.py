@@ -19,8 +19,9 @@ from ..geometry.triangulate import newell_normal
 from ..imaging.image_io import Picture
 from .atlas import encoded_page
 from .bases import frame_of
-from .retarget import RAISED, Style
+from .retarget import RAISED
 from .splitting import SplitRule
+from .style import Style
 from .synthesis import resized_rule
 
 if TYPE_CHECKING:

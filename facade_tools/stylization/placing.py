@@ -55,18 +55,28 @@ class Placed:
         return inside
 
 
-def placed_blocks(sheet: StyleSheet, own: Blocks, target: Blocks) -> list[Placed]:
-    """Return the source block of least Ψ on every target block (eq. 6, 7), mapped to its corners.
-
-    Then, from the ground up, walls under overhangs are thinned and edges snapped to the blocks
-    below (5.1.2, 5.2.1) unless the two source blocks stand on each other like that themselves.
-    """
-    sources = {block.id: block for block in sheet.blocks}
+def matched_blocks(sheet: StyleSheet, own: Blocks, target: Blocks) -> list[str]:
+    """Return the id of the source block of least Ψ for every target block (eq. 6, 7)."""
+    sources = {block.id for block in sheet.blocks}
     known = [block for block in own.blocks if block.id in sources]
     chosen = match_blocks(candidates(known), candidates(target.blocks))
+    return [known[index].id for index in chosen]
+
+
+def placed_blocks(
+    sheet: StyleSheet, own: Blocks, target: Blocks, chosen: Sequence[str] | None = None
+) -> list[Placed]:
+    """Return the source block of every target block, mapped to its corners.
+
+    chosen: ids of the source blocks, if they are not those of least Ψ. From the ground up, walls
+    under overhangs are thinned and edges snapped to the blocks below (5.1.2, 5.2.1) unless the two
+    source blocks stand on each other like that themselves.
+    """
+    sources = {block.id: block for block in sheet.blocks}
+    ids = matched_blocks(sheet, own, target) if chosen is None else chosen
     placed = [
-        _stretched(sheet, sources[known[index].id], block)
-        for block, index in zip(target.blocks, chosen, strict=True)
+        _stretched(sheet, sources[name], block)
+        for block, name in zip(target.blocks, ids, strict=True)
     ]
     for pair in _stacked(placed):
         if not _native(own, placed[pair[0]], placed[pair[1]]):

@@ -86,7 +86,8 @@ def working_density(faces: Sequence[WallFace], resolution: float) -> float:
 def face_pictures(mesh: TexturedMesh, faces: Sequence[WallFace], density: float) -> list[Picture]:
     """Return the picture of every face.
 
-    Of several triangles over one pixel the nearest to the face's plane wins. Pixels that nothing
+    Of several triangles over one pixel the outermost wins, as one sees it from outside; where
+    another face stands before the pixel, the nearest to the face's plane. Pixels that nothing
     covers take the mean colour of the face, and faces that nothing covers that of the walls.
     """
     paints = palette(mesh)
@@ -113,7 +114,8 @@ def face_pictures(mesh: TexturedMesh, faces: Sequence[WallFace], density: float)
         )
         shape = (_pixels(face.height, density), _pixels(face.width, density))
         scale = np.array([shape[1] / face.width, shape[0] / face.height])
-        drawn = _drawn(view, uv[near], mesh.paint[near], paints, scale, shape, reach)
+        surface = Surface(view, uv[near], mesh.paint[near], paints)
+        drawn = _drawn(surface, scale, shape, reach, _hidden(face, faces, shape, reach))
         results.append(usual.copy() if drawn is None else drawn)
     return results
 
@@ -141,7 +143,7 @@ def top_picture(mesh: TexturedMesh, low: Floats, high: Floats, density: float) -
     uv = np.where(np.isfinite(mesh.uv), mesh.uv, 0.0)[flat]
     scale = np.array([shape[1] / width, shape[0] / depth])
     reach = float(np.ptp(mesh.vertices[:, 2])) + 1.0
-    drawn = _drawn(view, uv, mesh.paint[flat], palette(mesh), scale, shape, reach)
+    drawn = _drawn(Surface(view, uv, mesh.paint[flat], palette(mesh)), scale, shape, reach)
     return np.full((*shape, 3), 190, dtype=np.uint8) if drawn is None else drawn
 
 
@@ -163,27 +165,70 @@ def _overlaps(low: Floats, high: Floats, face: WallFace, reach: float) -> Boolea
     return found
 
 
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """Triangles before a face: view (m, 3, 3), uv (m, 3, 2), paint (m,) and their pictures.
+
+    view: metres to the right of and below the face's upper left corner, and before its plane.
+    """
+
+    view: Floats
+    uv: Floats
+    paint: Integers
+    paints: Palette
+
+
+def _hidden(
+    face: WallFace, faces: Sequence[WallFace], shape: tuple[int, int], reach: float
+) -> Booleans:
+    """Return the pixels of a face before which another face of its side stands."""
+    _, direction, _, sign = SIDES[face.side]
+    hidden = np.zeros(shape, dtype=bool)
+    scale = shape[1] / face.width, shape[0] / face.height
+    for other in faces:
+        before = sign * (other.place - face.place)
+        if other.side == face.side and 1e-6 < before < reach:
+            left, right = (
+                direction * (end - face.start) * scale[0] for end in (other.start, other.end)
+            )
+            top, bottom = ((face.top - z) * scale[1] for z in (other.top, other.bottom))
+            rows = slice(max(round(top), 0), max(round(bottom), 0))
+            hidden[rows, max(round(left), 0) : max(round(right), 0)] = True
+    return hidden
+
+
 def _drawn(
-    view: Floats,
-    uv: Floats,
-    paint: Integers,
-    paints: Palette,
+    surface: Surface,
     scale: Floats,
     shape: tuple[int, int],
     reach: float,
+    hidden: Booleans | None = None,
 ) -> Picture | None:
-    """Return the picture of a face, None where nothing covers any of it."""
-    pixels = view.copy()
-    pixels[:, :, :2] *= scale
-    picture = np.zeros((*shape, 3), dtype=np.uint8)
-    depth = np.full(shape, reach)
-    _rasterise(pixels, uv, paint, paints.pixels, paints.table, picture, depth)
-    covered = depth < reach
+    """Return the picture of a face, None where nothing covers any of it.
+
+    hidden: pixels at which the nearest surface is drawn instead of the outermost.
+    """
+    picture, covered = _rendered(surface, scale, shape, reach, reach)
+    if hidden is not None and hidden.any():
+        nearest, near = _rendered(surface, scale, shape, 0.0, reach)
+        picture[hidden], covered[hidden] = nearest[hidden], near[hidden]
     if not covered.any():
         return None
     if not covered.all():
         picture[~covered] = np.round(picture[covered].mean(axis=0)).astype(np.uint8)
     return picture
+
+
+def _rendered(
+    surface: Surface, scale: Floats, shape: tuple[int, int], focus: float, reach: float
+) -> tuple[Picture, Booleans]:
+    """Return what lies nearest to the plane `focus` metres before a face, and where anything is."""
+    pixels = surface.view * np.array([*scale, 1.0]) - np.array([0.0, 0.0, focus])
+    picture = np.zeros((*shape, 3), dtype=np.uint8)
+    depth = np.full(shape, focus + reach)
+    colours = surface.paints.pixels, surface.paints.table
+    _rasterise(pixels, surface.uv, surface.paint, *colours, picture, depth)
+    return picture, depth < focus + reach
 
 
 @compiled

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -15,25 +15,18 @@ from ..geometry.arrays import Floats
 from ..geometry.mesh import Material, Mesh, Scene
 from ..imaging.image_io import Picture
 from .atlas import LARGEST_PAGE, PADDING, Atlas, encoded_page, painted, planned
+from .bays import with_bays
 from .hull import layers, mass, roofs
 from .panels import SMALL, Panel, panels, reassigned
-from .placing import Placed, foreign_blocks, placed_blocks, placed_slabs
+from .placing import Placed, foreign_blocks, matched_blocks, placed_blocks, placed_slabs
 from .projection import SIDES
 from .remesh import Slab
+from .style import Style
 from .synthesis import Part, shape_of, synthesised
 
 FINER = 2.0  # resolution of the atlas over the source's textures
 MAX_ATLAS_PIXELS = 400_000_000  # of all pages together; one is in memory at a time
 RAISED = 0.005  # m: textured faces stand before the closed solid by this much
-
-
-@dataclass(frozen=True, slots=True)
-class Style:
-    """A style sheet with its pictures by file name, and the source's own blocks."""
-
-    sheet: StyleSheet
-    blocks: Blocks
-    pictures: Mapping[str, Picture]
 
 
 def retarget(style: Style, target: Blocks, small: float = SMALL) -> Scene:
@@ -45,7 +38,9 @@ def retarget(style: Style, target: Blocks, small: float = SMALL) -> Scene:
     closed solid `mass` lies behind the textured walls and roofs. The result stands in the
     target's frame.
     """
-    placed = placed_blocks(style.sheet, style.blocks, target)
+    chosen = matched_blocks(style.sheet, style.blocks, target)
+    style, chosen = with_bays(style, chosen, target)
+    placed = placed_blocks(style.sheet, style.blocks, target, chosen)
     slabs = [placed_slabs(style.sheet, item) for item in placed]
     found = panels(style.sheet, placed, slabs)
     found = reassigned(found, foreign_blocks(style.blocks, placed), small)
@@ -190,6 +185,7 @@ def _roof_uv(style: Style, placed: Placed, points: Floats) -> Floats:
     plan = np.stack(
         [np.interp(points[:, k], placed.maps[k][1], placed.maps[k][0]) for k in (0, 1)], axis=1
     )
+    plan *= np.array([source.width, source.depth]) / np.array(placed.source.size[:2])  # bays repeat
     plan += np.array([source.x, source.y])
     boxes = [(b.x, b.y, b.x + b.width, b.y + b.depth) for b in style.blocks.blocks]
     low, high = np.min(boxes, axis=0)[:2], np.max(boxes, axis=0)[2:]

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..geometry.arrays import Booleans, Floats
 
 SMOOTHNESS = 0.025  # λ of eq. 3
+END = 0.3  # of the wall that it stands for: the least last wall of a rule
 CROWDED = 0.9  # S_r below this: more windows fit than look right
 
 
@@ -188,6 +189,17 @@ def _arranged(rule: SplitRule, size: float, windows: int) -> Split:
     stretch = (size - fixed) / flexible
     sizes = tuple(_width(rule, i) * (1.0 if i % 2 else stretch) for i in sources)
     return Split(sources, sizes, windows, stretch)
+
+
+def end_wall(rule: SplitRule, done: Split) -> int:
+    """Return the wall that the second half of a split's last section is to show.
+
+    At its end a face looks as its source does at its own: the frame of a window that does not
+    follow would stand there. A rule whose last wall is hardly there has no such look to give.
+    """
+    last = done.sources[-1] // 2
+    enough = rule.scalable[-1] > END * rule.scalable[last]
+    return 2 * (len(rule.insertable) if done.windows and enough else last)
 
 
 def _plain(rule: SplitRule, size: float) -> Split:

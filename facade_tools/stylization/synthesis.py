@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..compiled import compiled
 from ..geometry.arrays import Floats, Integers
 from ..imaging.image_io import Picture
-from .splitting import SplitRule, split, variance_signal
+from .splitting import SplitRule, end_wall, split, variance_signal
 
 PLAIN = 0.5  # of a wall beside windows, that a face without windows is made of
 TOLERATED = 0.1  # stretch of a texture in which no windows were found
@@ -64,6 +64,7 @@ def positions(
         return np.asarray(np.clip((first + share * width) / source, 0.0, 1.0))
     index = np.array(done.sources)[section]
     wall = index % 2 == 0
+    index = np.where((section == len(done.sizes) - 1) & (share >= 0.5), end_wall(own, done), index)
     share = np.where(wall, _to_and_fro(share, done.stretch), share)
     places: Floats = np.clip((starts[index] + share * widths[index]) / source, 0.0, 1.0)
     return places

@@ -1,0 +1,248 @@
+"""Bays of relief: windows and columns that stand in the plan are repeated, not widened (eq. 8).
+
+The rule of a block's axis comes from the depths of its plans as the rule of a face comes from the
+colours of its picture: where walls stand before or behind their usual plane is insertable.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from ..artifacts.blocks import Blocks
+from ..artifacts.stylesheet import Group, Rule, StyleFace, StyleFloor
+from ..geometry.arrays import Booleans, Floats
+from ..imaging.image_io import Picture
+from .groups import LEAST_WALL, MULLION
+from .projection import SIDES
+from .splitting import SplitRule, end_wall, insertable_labels, merged, rule_of, split
+from .style import Style
+
+OFF = 0.02  # m: what stands off its plane by more is relief
+SHARE = 0.15  # of the height that has relief somewhere, for a block to have bays
+FINE = 0.02  # m: places of the depth signal
+NARROWEST, WIDEST = 0.2, 8.0  # m: of a bay; wider relief is a wing, and stretches with its block
+CORNERS = 0.2  # of a wall in the plane of its corners, for that to be its plane
+SAME = 0.01  # change of size that leaves all as it is
+PLAIN = Group("bay", "vertical", "bay")  # of parts of faces: they are stretched with their piece
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A stretch of the source (m) and where it goes in the result (m), both along one axis."""
+
+    old: tuple[float, float]
+    new: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Bays:
+    """How a block repeats along an axis: a rule between two margins (m) that keep their size."""
+
+    low: float
+    rule: SplitRule
+    high: float
+
+
+def relief_bays(floors: Sequence[StyleFloor], axis: int, size: float) -> Bays | None:
+    """Return how a block's relief repeats along an axis, None where it does not.
+
+    axis: 0 for x, 1 for y. size: of the block along it (m).
+    """
+    height = sum(floor.top - floor.bottom for floor in floors)
+    count = max(8, round(size / FINE))
+    places = (np.arange(count) + 0.5) * size / count
+    relief = np.zeros(count)
+    for floor in floors:
+        relief += (floor.top - floor.bottom) * _off_plane(floor, axis, places)
+    if relief.max() < SHARE * height:
+        return None
+    labels = insertable_labels(relief / relief.max())
+    labels = merged(labels, 2 * NARROWEST / size * count, MULLION / size * count)
+    rule = rule_of(labels, size)
+    if not rule.insertable or max(rule.insertable) > WIDEST:
+        return None
+    lines = [floor.xs if axis == 0 else floor.ys for floor in floors]
+    low, high = max(line[0] for line in lines), max(size - line[-1] for line in lines)
+    first, *inner, last = rule.scalable
+    if low > first or high > last or sum(rule.scalable) < LEAST_WALL * size:
+        return None  # some floor is narrower: no bay can stand there
+    return Bays(low, SplitRule((first - low, *inner, last - high), rule.insertable), high)
+
+
+def _off_plane(floor: StyleFloor, axis: int, places: Floats) -> Booleans:
+    """Return where a floor's front or back stands off its plane."""
+    lines, across = (np.array(v) for v in ((floor.xs, floor.ys), (floor.ys, floor.xs))[axis])
+    cells = np.array([[c == "1" for c in row] for row in floor.cells], dtype=bool)
+    cells = cells if axis == 0 else cells.T  # (across, along)
+    column = np.clip(np.searchsorted(lines, places) - 1, 0, len(lines) - 2)
+    filled = cells.any(axis=0)
+    off = np.zeros(len(lines) - 1, dtype=bool)
+    for depths in (
+        across[:-1][cells.argmax(axis=0)],
+        across[1:][::-1][cells[::-1].argmax(axis=0)],
+    ):
+        widths = np.diff(lines) * filled
+        off |= np.abs(depths - _plane(depths, widths)) > OFF
+    inside = (places > lines[0]) & (places < lines[-1])
+    return np.asarray(inside & (off & filled)[column])
+
+
+def _plane(depths: Floats, widths: Floats) -> float:
+    """Return the depth of a wall's plane: that of its corners, or of most of it.
+
+    Corners stand in it unless hardly anything else does (then they are pilasters); wide doors may
+    take more of a wall than the piers between them.
+    """
+    shares = [float(widths[np.abs(depths - d) < OFF].sum()) for d in depths.tolist()]
+    filled = np.flatnonzero(widths)
+    corners = [int(filled[0]), int(filled[-1])]
+    best = max(corners, key=shares.__getitem__)
+    if shares[best] < CORNERS * widths.sum():
+        best = int(np.argmax(shares))
+    return float(depths[best])
+
+
+def pieces(bays: Bays, size: float, target: float) -> list[Piece]:
+    """Return the pieces, in order, of a block whose size (m) becomes the target's."""
+    done = split(bays.rule, max(target - bays.low - bays.high, 1e-3))
+    widths = np.empty(2 * len(bays.rule.insertable) + 1)
+    widths[::2], widths[1::2] = bays.rule.scalable, bays.rule.insertable
+    starts = bays.low + np.concatenate([[0.0], np.cumsum(widths)])
+    borders = bays.low + np.concatenate([[0.0], np.cumsum(done.sizes)])
+    found = [Piece((0.0, bays.low), (0.0, bays.low))]
+    for k, (a, b) in zip(done.sources, pairwise(borders.tolist()), strict=True):
+        found.append(Piece((float(starts[k]), float(starts[k + 1])), (a, b)))
+    end, last = end_wall(bays.rule, done), found[-1]
+    if end != done.sources[-1]:
+        halves = [(x + y) / 2 for x, y in (last.old, (starts[end], starts[end + 1]), last.new)]
+        found[-1] = Piece((last.old[0], halves[0]), (last.new[0], halves[2]))
+        found.append(Piece((float(halves[1]), float(starts[end + 1])), (halves[2], last.new[1])))
+    found.append(Piece((size - bays.high, size), (target - bays.high, target)))
+    return [p for p in found if min(p.old[1] - p.old[0], p.new[1] - p.new[0]) > 1e-9]
+
+
+def with_bays(style: Style, chosen: Sequence[str], target: Blocks) -> tuple[Style, list[str]]:
+    """Return a style with a block of its own for every target whose relief repeats.
+
+    chosen: ids of the source blocks of the target's blocks. Returns the style and the new ids.
+    """
+    ids = []
+    for source, block in zip(chosen, target.blocks, strict=True):
+        name = source
+        for axis, size in enumerate((block.width, block.depth)):
+            style, name = _with_bays(style, name, axis, size)
+        ids.append(name)
+    return style, ids
+
+
+def _with_bays(style: Style, name: str, axis: int, target: float) -> tuple[Style, str]:
+    sheet = style.sheet
+    block = next(b for b in sheet.blocks if b.id == name)
+    size = block.size[axis]
+    numbers = [i for i, floor in enumerate(sheet.floors) if floor.block == name]
+    bays = relief_bays([sheet.floors[i] for i in numbers], axis, size)
+    if bays is None or abs(target / size - 1) < SAME:
+        return style, name
+    found = pieces(bays, size, target)
+    new = f"{name}/{'xy'[axis]}{len(sheet.blocks)}"
+    pictures = dict(style.pictures)
+    floors = [replace(_floor(sheet.floors[i], axis, found), block=new) for i in numbers]
+    number = {old: len(sheet.floors) + k for k, old in enumerate(numbers)}
+    ends = (bays.low, size - bays.high)
+    walls = []
+    for wall in sheet.walls:
+        if wall.block == name:
+            along = SIDES[wall.side][0] == axis
+            faces = [
+                replace(part, floor=number[face.floor])
+                for face in wall.faces
+                for part in (
+                    _along(face, found, pictures) if along else _across(face, found, ends, target)
+                )
+            ]
+            walls.append(replace(wall, block=new, faces=tuple(faces)))
+    sizes = tuple(target if k == axis else v for k, v in enumerate(block.size))
+    sheet = replace(
+        sheet,
+        blocks=(*sheet.blocks, replace(block, id=new, size=sizes)),
+        floors=(*sheet.floors, *floors),
+        walls=(*sheet.walls, *walls),
+        groups=sheet.groups if PLAIN in sheet.groups else (*sheet.groups, PLAIN),
+        rules=sheet.rules if PLAIN in sheet.groups else (*sheet.rules, Rule(PLAIN.rule, (1.0,))),
+    )
+    own = next(b for b in style.blocks.blocks if b.id == name)
+    blocks = replace(style.blocks, blocks=(*style.blocks.blocks, replace(own, id=new)))
+    return replace(style, sheet=sheet, blocks=blocks, pictures=pictures), new
+
+
+def _floor(floor: StyleFloor, axis: int, found: Sequence[Piece]) -> StyleFloor:
+    """Return a floor whose plan is put together of pieces along an axis."""
+    lines = np.array(floor.xs if axis == 0 else floor.ys)
+    rows = list(floor.cells) if axis == 1 else _turned(floor.cells)
+    places, cells = [found[0].new[0]], []
+    for piece in found:
+        inner = lines[(lines > piece.old[0] + 1e-9) & (lines < piece.old[1] - 1e-9)].tolist()
+        for low, high in pairwise([piece.old[0], *inner, piece.old[1]]):
+            k = int(np.searchsorted(lines, 0.5 * (low + high))) - 1
+            cells.append(rows[k] if 0 <= k < len(rows) else "0" * len(rows[0]))
+            places.append(_moved(piece, high))
+    if axis == 0:
+        return replace(floor, xs=tuple(places), cells=tuple(_turned(cells)))
+    return replace(floor, ys=tuple(places), cells=tuple(cells))
+
+
+def _turned(rows: Sequence[str]) -> list[str]:
+    return ["".join(column) for column in zip(*rows, strict=True)]
+
+
+def _moved(piece: Piece, place: float) -> float:
+    (a, b), (c, d) = piece.old, piece.new
+    return c + (place - a) / (b - a) * (d - c)
+
+
+def _along(
+    face: StyleFace, found: Sequence[Piece], pictures: dict[str, Picture]
+) -> Iterator[StyleFace]:
+    """Yield what of a face each piece shows; parts of its picture are added to the pictures."""
+    low, high = sorted((face.start, face.end))
+    for piece in found:
+        a, b = max(low, piece.old[0]), min(high, piece.old[1])
+        if b - a < 1e-6:
+            continue
+        whole = b - a > high - low - 1e-6
+        ends = _moved(piece, a), _moved(piece, b)
+        start, end = ends if face.end > face.start else ends[::-1]
+        if whole:
+            yield replace(face, start=start, end=end)
+            continue
+        shares = sorted((edge - face.start) / (face.end - face.start) for edge in (a, b))
+        picture = pictures[face.texture]
+        first = min(round(shares[0] * picture.shape[1]), picture.shape[1] - 1)
+        last = max(round(shares[1] * picture.shape[1]), first + 1)
+        name = f"{face.texture}:{first}:{last}"
+        pictures[name] = picture[:, first:last]
+        yield replace(face, start=start, end=end, texture=name, vertical=PLAIN.id)
+
+
+def _across(
+    face: StyleFace, found: Sequence[Piece], ends: tuple[float, float], target: float
+) -> Iterator[StyleFace]:
+    """Yield a face across the axis in every piece that it stands in; outer walls stand once."""
+    if face.place <= ends[0] + 1e-6:
+        yield face
+        return
+    last = found[-1]
+    if face.place >= ends[1] - 1e-6:
+        yield replace(face, place=target - (last.old[1] - face.place))
+        return
+    places = {
+        round(_moved(piece, face.place), 9)
+        for piece in found
+        if piece.old[0] - 1e-6 <= face.place <= piece.old[1] + 1e-6
+    }
+    for place in sorted(places):
+        yield replace(face, place=place)

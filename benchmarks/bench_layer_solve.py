@@ -16,7 +16,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tests"))
 
-from layering_oracle import TooLarge, best, broken, random_direction, words_of  # noqa: E402
+from layering_checks import broken  # noqa: E402
+from layering_designs import random_direction, words_of  # noqa: E402
+from layering_oracle import TooLarge, best  # noqa: E402
 
 from facade_tools.artifacts.store import read_one  # noqa: E402
 from facade_tools.layering.alignment import prepare  # noqa: E402

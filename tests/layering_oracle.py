@@ -1,26 +1,23 @@
 # ruff: noqa: B905, C901
 """An independent, slow reading of what CONTRACT.md says `layer-solve` minimises.
 
-Words are enumerated outright, every partition is built column by column, linear programmes give
-Ω where sizes are free and tell whether a sizing exists. Nothing here is shared with the solver
-but the data classes of a problem.
+Every partition of every tuple of words is walked through (layering_walk), linear programmes give Ω
+where sizes are free and tell whether a sizing exists. Nothing here is shared with the solver but
+the data classes of a problem.
 """
 
 from __future__ import annotations
 
 import itertools
-import random
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linprog, nnls
-
-from facade_tools.layering.language import parse
-from facade_tools.layering.problem import Direction, LayerPattern, Rule
+from layering_walk import SYMBOLS, simplex, walk
 
 TOLERANCES = (0.02, 0.05, 0.1, 0.2, 0.4)
-MOST_PARTITIONS = 200_000
-MOST_STEPS = 4_000_000
+MOST_PARTITIONS = 300_000
+MOST_STEPS = 200_000_000
+MOST_PROGRAMMES = 20_000
 
 
 class TooLarge(Exception):
@@ -33,6 +30,19 @@ class Cell:
 
     letter: int
     piece: bool
+
+
+def least_cost(cost, upper, equal, least):
+    """(status, x) of min cost · x with rows (line, right) ≤ or =, x ≥ least; status 0: found."""
+    n, slacks = len(cost), len(upper)
+    matrix = np.zeros((slacks + len(equal), n + slacks))
+    right = np.zeros(len(matrix))
+    for i, (line, value) in enumerate([*upper, *equal]):
+        matrix[i, :n] = line
+        right[i] = value - np.dot(line, least)
+    matrix[:slacks, n:] = np.eye(slacks)
+    status, x = simplex(np.concatenate([cost, np.zeros(slacks)]), matrix, right)
+    return status, x[:n] + least
 
 
 def unsized_and_known(direction, word):
@@ -68,13 +78,12 @@ def admitted(direction, words, mu):
     names = sorted({n for counts, *_ in rows for n in counts})
     if not names:
         return all(low <= known <= high for _, known, low, high in rows)
-    a, b = [], []
+    upper = []
     for counts, known, low, high in rows:
         line = np.array([counts.get(n, 0) for n in names], float)
-        a += [line, -line]
-        b += [high - known, known - low]
-    bounds = [(0.01 * direction.canvas, None)] * len(names)
-    return linprog(np.zeros(len(names)), A_ub=a, b_ub=b, bounds=bounds).status == 0
+        upper += [(line, high - known), (-line, known - low)]
+    least = np.full(len(names), 0.01 * direction.canvas)
+    return least_cost(np.zeros(len(names)), upper, [], least)[0] == 0
 
 
 def substrings(direction, word, state, split):
@@ -94,87 +103,82 @@ def substrings(direction, word, state, split):
         yield list(cells), (end + 1, False)
 
 
-def allowed(direction, words, column, before):
-    """The constraints of IMAW15 5.2 as papers/README.md reads them."""
-    rules = direction.rules
-    letters = [[w[c.letter] for c in cells] for w, cells in zip(words, column)]
-    if not any(
-        row and all(rules[a.symbol].opaque and not a.transparent for a in row) for row in letters
-    ):
-        return False
-    for i, row in enumerate(letters):
-        if any(rules[a.symbol].unoccludable for a in row):
-            for above in letters[:i]:
-                if above and not all(a.transparent for a in above):
-                    return False
-    if before is not None:
-        previous = [[w[c.letter] for c in cells] for w, cells in zip(words, before)]
-        for left, right in zip(previous, letters):
-            if left and rules[left[-1].symbol].attached and not right:
-                return False
-            if right and rules[right[0].symbol].attached and not left:
-                return False
-    return True
+def options_of(direction, words, split, mu, symbols):
+    """(table, first option of each row's states, cells, least sizes to come) for `walk`."""
+    table, cells = [], []
+    states = 2 * max(map(len, words)) + 3
+    begin = np.zeros((len(words), states + 1), np.int64)
+    rest = np.zeros((len(words), states))
+    most = direction.canvas + mu
+    for row, word in enumerate(words):
+        for state in range(states):
+            begin[row, state] = len(table)
+            position, inside = divmod(state, 2)
+            if position > len(word) or (position == len(word) and inside):
+                continue
+            rest[row, state] = sum(
+                direction.rules[a.symbol].size or 0.01 * direction.canvas
+                for a in word[position + inside :]
+            )
+            for own, (then, still) in substrings(direction, word, (position, bool(inside)), split):
+                table.append([2 * then + still, *described(direction, word, own, most, symbols)])
+                cells.append(own)
+        begin[row, states] = len(table)
+    return np.array(table, float), begin, cells, rest
 
 
-def least(direction, letters):
-    """A lower bound on the size of letters: unsized ones at their least."""
-    sizes = [direction.rules[a.symbol].size for a in letters]
-    return sum(0.01 * direction.canvas if size is None else size for size in sizes)
+def described(direction, word, cells, most, symbols):
+    """What `walk` reads of a substring, but for the state that it leads to."""
+    rules = [direction.rules[word[c.letter].symbol] for c in cells]
+    clear = [word[c.letter].transparent for c in cells]
+    low = high = 0.0
+    for c, rule in zip(cells, rules):
+        low += 0.0 if c.piece else rule.size or 0.01 * direction.canvas
+        high += rule.size or most
+    counts = [sum(word[c.letter].symbol == s and not c.piece for c in cells) for s in symbols]
+    return (
+        len(cells),
+        all(clear),
+        bool(cells) and all(r.opaque and not t for r, t in zip(rules, clear)),
+        any(r.unoccludable for r in rules),
+        bool(cells) and rules[0].attached,
+        bool(cells) and rules[-1].attached,
+        low,
+        high,
+        sum(c.piece for c in cells),
+        *counts,
+    )
 
 
 def partitions(direction, words, split, mu, most):
-    """Yield all partitions (a list of columns) that the constraints and known sizes allow.
+    """Return (Ω at least, pieces, −columns, columns of cells) of all that may count.
 
     most: greatest Ω that known sizes may ask for.
     """
-    count = 0
-    canvas, slack = direction.canvas, 1e-9 * direction.canvas
-    rest = [[least(direction, w[k:]) for k in range(len(w) + 2)] for w in words]
-    steps = {}
-
-    def options_of(row, state):
-        if (row, state) not in steps:
-            steps[row, state] = list(substrings(direction, words[row], state, split))
-        return steps[row, state]
-
-    def sums(column):
-        for word, cells in zip(words, column):
-            if cells and not any(c.piece for c in cells):
-                sizes = [direction.rules[word[c.letter].symbol].size for c in cells]
-                if None not in sizes:
-                    yield sum(sizes)
-
-    def walk(states, columns, omega, sigma):
-        nonlocal count
-        if all(s == (len(w), False) for s, w in zip(states, words)):
-            yield columns
-            return
-        options = [options_of(row, state) for row, state in enumerate(states)]
-        for choice in itertools.product(*options):
-            column = [cells for cells, _ in choice]
-            count += 1
-            if count > MOST_STEPS:
-                raise TooLarge
-            if not any(column) or not allowed(
-                direction, words, column, columns[-1] if columns else None
-            ):
-                continue
-            values = list(sums(column))
-            if not values:
-                values = [0.0]
-            more, wide = omega + max(values) - min(values), sigma + max(values)
-            if more > most + slack:
-                continue
-            after = [rest[r][k + inside] for r, (_, (k, inside)) in enumerate(choice)]
-            if wide + max(after) <= canvas + mu + slack:
-                yield from walk([s for _, s in choice], [*columns, column], more, wide)
-
-    yield from walk([(0, False)] * len(words), [], 0.0, 0.0)
+    symbols = sorted({a.symbol for word in words for a in word})
+    table, begin, cells, rest = options_of(direction, words, split, mu, symbols)
+    ends = np.array([2 * len(word) for word in words])
+    sizes = [direction.rules[s].size for s in symbols]
+    least = np.array([0.01 * (direction.canvas if z is None else z) for z in sizes])
+    slack = 1e-9 * direction.canvas
+    m = len(words)
+    assert table.shape[1] == SYMBOLS + len(symbols)
+    for rows in (1_000, 16_000, MOST_PARTITIONS):
+        found, columns, omega, pieces, all_ = walk(
+            table, begin, ends, rest, m, len(symbols), least, most + slack,
+            direction.canvas + mu + slack, rows, MOST_STEPS,
+        )  # fmt: skip
+        if all_:
+            break
+    else:
+        raise TooLarge
+    for choice, count, value, cuts in zip(found, columns, omega, pieces):
+        taken = [[choice[j * m + r] for r in range(m)] for j in range(count)]
+        yield round(value, 7), int(cuts), -int(count), [[cells[k] for k in col] for col in taken]
 
 
 def whole(columns):
-    """Drop partitions in which a letter is 'split' into a single piece."""
+    """Return how many pieces every split letter has."""
     counts = {}
     for column in columns:
         for row, cells in enumerate(column):
@@ -206,7 +210,7 @@ def error(direction, words, columns, mu):
                 if c.piece:
                     place[row, c.letter, j] = len(place)
     n, k = len(place), len(columns)
-    a, b, ae, be = [], [], [], []
+    upper, equal = [], []
     for j, column in enumerate(columns):
         for row, cells in enumerate(column):
             if not cells:
@@ -223,8 +227,7 @@ def error(direction, words, columns, mu):
             up, down = line.copy(), -line
             up[n + j] -= 1
             down[n + k + j] += 1
-            a += [up, down]
-            b += [-known, known]
+            upper += [(up, -known), (down, known)]
     for row, letter in pieces:
         line = np.zeros(n + 2 * k)
         for j in range(k):
@@ -234,25 +237,23 @@ def error(direction, words, columns, mu):
         size = direction.rules[symbol].size
         if size is None:
             line[place[symbol]] -= 1
-        ae.append(line)
-        be.append(size or 0.0)
+        equal.append((line, size or 0.0))
     total = np.zeros(n + 2 * k)
     total[n : n + k] = 1
-    a.append(total)
-    b.append(canvas + mu + slack)
+    upper.append((total, canvas + mu + slack))
     for counts, known, low, high in eq7(direction, words, mu):
         line = np.zeros(n + 2 * k)
         for name, times in counts.items():
             line[place[name]] = times
-        a += [line, -line]
-        b += [high - known, known - low]
-    bounds = [(0.01 * canvas, None)] * len(names) + [(0, None)] * (n - len(names) + 2 * k)
+        upper += [(line, high - known), (-line, known - low)]
+    least = np.zeros(n + 2 * k)
+    least[: len(names)] = 0.01 * canvas
     cost = np.zeros(n + 2 * k)
     cost[n : n + k], cost[n + k :] = 1, -1
-    solved = linprog(cost, A_ub=a, b_ub=b, A_eq=ae or None, b_eq=be or None, bounds=bounds)
-    if solved.status != 0 or solved.fun > mu + 2 * slack:
+    status, x = least_cost(cost, upper, equal, least)
+    if status != 0 or cost @ x > mu + 2 * slack:
         return None
-    return max(0.0, solved.fun), float(solved.x[n : n + k].sum())
+    return max(0.0, float(cost @ x)), float(x[n : n + k].sum())
 
 
 def sizable(direction, words, columns):
@@ -267,7 +268,7 @@ def sizable(direction, words, columns):
                 if c.piece:
                     pieces.setdefault((row, c.letter), []).append(len(place))
                     place[row, c.letter, j] = len(place)
-    ae, be = [], []
+    equal = []
     fill = np.zeros(len(place))
     for j, column in enumerate(columns):
         first = None
@@ -281,20 +282,17 @@ def sizable(direction, words, columns):
                 first = line
                 fill += line
             else:
-                ae.append(line - first)
-                be.append(0.0)
+                equal.append((line - first, 0.0))
     for (row, letter), places in pieces.items():
         line = np.zeros(len(place))
         line[places] = 1
         line[place[words[row][letter].symbol]] -= 1
-        ae.append(line)
-        be.append(0.0)
-    ae.append(fill)
-    be.append(1.0)
+        equal.append((line, 0.0))
+    equal.append((fill, 1.0))
     sizes = [direction.rules[s].size for s in symbols]
-    bounds = [(0.01 * s / canvas if s else 0.01, None) for s in sizes]
-    bounds += [(0, None)] * (len(place) - len(symbols))
-    return linprog(np.zeros(len(place)), A_eq=ae, b_eq=be, bounds=bounds).status == 0
+    least = np.zeros(len(place))
+    least[: len(symbols)] = [0.01 * s / canvas if s else 0.01 for s in sizes]
+    return least_cost(np.zeros(len(place)), [], equal, least)[0] == 0
 
 
 def best(direction, words_of_layers):
@@ -316,167 +314,27 @@ def best(direction, words_of_layers):
 
 
 def best_within(direction, candidates, split, mu, most):
-    """(Ω, pieces, columns, |Σ − canvas|) of the best sizable partition with Ω ≤ most, or None."""
-    rows = []
-    number = 0
-    for words in candidates:
-        loose = any(direction.rules[a.symbol].size is None for word in words for a in word)
-        for columns in partitions(direction, words, split, mu, most):
-            pieces = whole(columns)
-            if any(times < 2 for times in pieces.values()):
-                continue
-            number += 40 if pieces or loose else 1  # a linear programme takes a millisecond
-            if number > MOST_PARTITIONS:
-                raise TooLarge
-            value = error(direction, words, columns, mu)
-            if value is not None and value[0] <= most + 1e-9 * direction.canvas:
-                omega, sigma = value
-                off = round(abs(sigma - direction.canvas), 7)
-                key = (round(omega, 7), sum(pieces.values()), -len(columns), off, len(rows))
-                rows.append((*key, words, columns))
-    for omega, pieces, columns, off, _, words, cols in sorted(rows, key=lambda r: r[:5]):
-        if sizable(direction, words, cols):
-            return omega, pieces, -columns, off
-    return None
+    """(Ω, pieces, columns, |Σ − canvas|) of the best sizable partition with Ω ≤ most, or None.
 
-
-def cells_of(alignment):
-    """The columns of a solver's alignment in this module's terms."""
-    columns = []
-    for j in range(alignment.count):
-        column = []
-        for row in range(len(alignment.candidate.words)):
-            first, end = alignment.letters(row, j)
-            start, stop = alignment.borders[j][row], alignment.borders[j + 1][row]
-            column.append(
-                [
-                    Cell(k, (k == first and start.inside) or (k == end - 1 and stop.inside))
-                    for k in range(first, end)
-                ]
-            )
-        columns.append(column)
-    return columns
-
-
-def broken(direction, alignment):
-    """What is wrong with a solver's alignment; nothing should be."""
-    words, columns = alignment.candidate.words, cells_of(alignment)
-    mu = alignment.tolerance * direction.canvas
-    if not admitted(direction, words, mu):
-        yield "eq. 7"
-    for row, word in enumerate(words):
-        letters = [c.letter for column in columns for c in column[row]]
-        if sorted(set(letters)) != list(range(len(word))) or letters != sorted(letters):
-            yield f"row {row} is not its word"
-    for before, column in zip([None, *columns], columns):
-        if not any(column) or not allowed(direction, words, column, before):
-            yield "a constraint of 5.2"
-    value = error(direction, words, columns, mu)
-    if value is None or abs(value[0] - alignment.omega) > 2e-6:
-        yield f"error {alignment.omega}, should be {value}"
-    if not sizable(direction, words, columns):
-        yield "no sizes"
-
-
-def reference_sizes(direction, alignments):
-    """Sizes of the sized symbols by bounded least squares, equalities as heavy rows.
-
-    x ≥ least is shifted to x ≥ 0 and solved by Lawson and Hanson's method: nothing in common with
-    the solver's.
+    Partitions come by what they are at best; those that cannot go before what is known are left.
     """
-    canvas = direction.canvas
-    found = [(al.candidate.words, cells_of(al)) for al in alignments]
-    symbols = sorted({a.symbol for words, _ in found for w in words for a in w})
-    place = {s: i for i, s in enumerate(symbols)}
-    letters = {}
-    for g, (_, columns) in enumerate(found):
-        for j, column in enumerate(columns):
-            for row, cells in enumerate(column):
-                for c in cells:
-                    if c.piece:
-                        letters.setdefault((g, row, c.letter), []).append(len(place))
-                        place[g, row, c.letter, j] = len(place)
-    rows, right = [], []
-    for g, (words, columns) in enumerate(found):
-        total = np.zeros(len(place))
-        for j, column in enumerate(columns):
-            lines = []
-            for row, cells in enumerate(column):
-                line = np.zeros(len(place))
-                for c in cells:
-                    line[
-                        place[(g, row, c.letter, j) if c.piece else words[row][c.letter].symbol]
-                    ] += 1
-                if cells:
-                    lines.append(line)
-            rows += [other - lines[0] for other in lines[1:]]
-            right += [0.0] * (len(lines) - 1)
-            total += lines[0]
-        rows.append(total)
-        right.append(1.0)
-    for (g, row, letter), places in letters.items():
-        line = np.zeros(len(place))
-        line[places] = 1
-        line[place[found[g][0][row][letter].symbol]] -= 1
-        rows.append(line)
-        right.append(0.0)
-    sizes = {s: direction.rules[s].size for s in symbols}
-    least = np.zeros(len(place))
-    for s, size in sizes.items():
-        least[place[s]] = 0.01 if size is None else 0.01 * size / canvas
-    wanted = [s for s in symbols if sizes[s] is not None]
-    goal = np.zeros((len(wanted), len(place)))
-    for i, s in enumerate(wanted):
-        goal[i, place[s]] = 1
-    wish = np.array([sizes[s] / canvas for s in wanted])
-    matrix, heavy = np.array(rows), 1e6
-    a = np.vstack([goal, heavy * matrix])
-    b = np.concatenate([wish - goal @ least, heavy * (np.array(right) - matrix @ least)])
-    x = nnls(a, b, maxiter=10_000)[0] + least
-    return {s: float(x[place[s]] * canvas) for s in wanted}
-
-
-def words_of(direction, row):
-    """Words of a pattern without counters, by the solver's own expansion (tested elsewhere)."""
-    from facade_tools.layering.words import Expansion, expand
-
-    transparent = frozenset(n for n, r in direction.rules.items() if r.transparent)
-    how = Expansion({}, direction.least_sizes(), 1e9, row.reflection, transparent)
-    return expand(row.node, how).words
-
-
-def random_direction(rng: random.Random, *, letters=5, layers=3, unsized=0.3, splits=True):
-    """A small random problem: sizes that nearly fit, all qualifiers, transparent and unsized."""
-    canvas = 12.0
-    rules = {}
-    pool = rng.choice([[1, 2, 3, 4, 5, 6], [1, 1.5, 2, 2.5, 3]]) if letters > 5 else range(1, 7)
-    for name in "ABCDE":
-        rules[name] = Rule(
-            size=float(rng.choice(list(pool))) + rng.choice([0, 0, 0, 0.1, -0.25]),
-            opaque=rng.random() < 0.85,
-            attached=rng.random() < 0.12,
-            unoccludable=rng.random() < 0.12,
-        )
-    for name in "tu":
-        free = rng.random() < unsized
-        size = None if free else float(rng.choice([2, 3, 4, 5, 8]))
-        rules[name] = Rule(size=size, transparent=True, attached=rng.random() < 0.08)
     rows = []
-    for i in range(rng.randint(2, layers)):
-        text = random_word(rng, rules, canvas, letters)
-        if rng.random() < 0.25:
-            text += "|" + random_word(rng, rules, canvas, letters)
-        rows.append(LayerPattern(f"L{i}", f"P{i}", parse(text)))
-    return Direction("x", canvas, rules, {"default": tuple(rows)})
-
-
-def random_word(rng, rules, canvas, letters):
-    """A word of about the canvas's size."""
-    word = ""
-    size = 0.0
-    while len(word) < letters and size < canvas - 1:
-        pool = "ABCDE" if rng.random() < 0.75 else "tu"
-        name = rng.choice(pool)
-        word += name
-        size += rules[name].size or 3.0
-    return word
+    for words in candidates:
+        for floor, pieces, columns, cells in partitions(direction, words, split, mu, most):
+            rows.append(((floor, pieces, columns), words, cells))
+    winner = None
+    for number, (floor, words, cells) in enumerate(sorted(rows, key=lambda row: row[0])):
+        if winner is not None and floor > winner[:3]:
+            break
+        if number > MOST_PROGRAMMES:
+            raise TooLarge
+        value = error(direction, words, cells, mu)
+        if value is None or value[0] > most + 1e-9 * direction.canvas:
+            continue
+        key = round(value[0], 7), *floor[1:], round(abs(value[1] - direction.canvas), 7)
+        if (winner is None or key < winner) and sizable(direction, words, cells):
+            winner = key
+    if winner is None:
+        return None
+    omega, pieces, columns, off = winner
+    return omega, pieces, -columns, off

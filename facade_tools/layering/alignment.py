@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from . import kernels, kernels_labels
+from .bounds import PairBounds
 from .candidates import Bounds
 from .evaluation import Borders, Line, crossings, evaluate, least_error
 from .lattice import Lattice, chain
@@ -54,6 +55,7 @@ class Task:
     budget: float
     splits: bool = False
     effort: Effort = field(default_factory=Effort)
+    rival: Alignment | None = None  # only what may go before it is wanted
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,6 +134,7 @@ class Aligner:
         """Align; `late(s)` tells whether the time will be up in s seconds by the clock `now`."""
         self.direction, self.late, self.now = direction, late, now
         self.maker = RowMaker(direction)
+        self.pairs = PairBounds(direction, self.maker)
         self._known: dict[tuple[tuple[Lattice, ...], str], list[float]] = {}
 
     def best(self, task: Task) -> Found:
@@ -227,16 +230,16 @@ class Aligner:
         merged = self.maker.rows(lattices, node.box, True, task.splits)
         twins = len(merged.lattices) < len(lattices)
         if not twins:
-            return self._run(merged, task, strict, node.forbidden[part])
+            return self._run(merged, task, strict, node.forbidden[part], ease > 0.0)
         if self._fills(merged, limits=strict) and not task.splits:
             loose = self._limits(task, True, ease, bool(node.box))
-            path, complete = self._run(merged, task, loose, node.forbidden[part])
+            path, complete = self._run(merged, task, loose, node.forbidden[part], ease > 0.0)
             if path is None or self._covered(path.words, path.borders):
                 return path, complete
         if len(lattices) <= MANY_LAYERS:
             rows = self.maker.rows(lattices, node.box, False, task.splits)
-            return self._run(rows, task, strict, node.forbidden[part])
-        path, _ = self._run(merged, task, strict, node.forbidden[part])
+            return self._run(rows, task, strict, node.forbidden[part], ease > 0.0)
+        path, _ = self._run(merged, task, strict, node.forbidden[part], ease > 0.0)
         return path, False
 
     @staticmethod
@@ -279,15 +282,24 @@ class Aligner:
             [
                 scale.down(budget), scale.down(widest), scale.of(canvas), task.splits,
                 effort.steps, effort.beam, loose, max(0, scale.down(floor)),
-                scale.down(shortest),
+                scale.down(shortest), *self._rival(task, loose),
             ],
             np.int64,
         )  # fmt: skip
 
+    def _rival(self, task: Task, loose: bool) -> tuple[int, int]:
+        """Return Ω and columns of what is known; several groups are not compared with it."""
+        one = task.rival
+        if one is None or task.splits or loose or len(task.candidate.parts) > 1:
+            return 0, 0
+        return self.maker.scale.of(one.omega), one.count
+
     def _run(
-        self, rows: Rows, task: Task, limits: Integers, forbidden: tuple[int, ...]
+        self, rows: Rows, task: Task, limits: Integers, forbidden: tuple[int, ...], eased: bool
     ) -> tuple[Path | None, bool]:
         labels, steps = FIRST_LABELS, FIRST_STEPS
+        box = {name: (low, high) for name, low, high in task.candidate.unsized}
+        guide = self.pairs.guide(() if eased else rows.lattices, box, task.tolerance, task.splits)
         while True:
             capacity = np.array([labels, labels], np.int64)
             limits[kernels_labels.MAX_STEPS] = steps
@@ -295,7 +307,7 @@ class Aligner:
             status, codes = kernels.search(
                 rows.starts, rows.places, rows.tally, rows.keys, rows.steps, rows.first,
                 rows.info, rows.stack, rows.spelling, np.array(forbidden, np.uint64), limits,
-                capacity,
+                guide, capacity,
             )  # fmt: skip
             full = max(status[kernels_labels.LABELS], status[kernels_labels.STATES]) >= labels
             long = status[kernels_labels.STEPS] > steps

@@ -26,6 +26,7 @@ from .kernels_labels import (
     BEAM,
     BEST,
     BUDGET,
+    COLUMNS,
     COMPLETE,
     DEPTH,
     HAS_GRIPS,
@@ -38,6 +39,7 @@ from .kernels_labels import (
     LOOSE,
     LOW,
     MAX_STEPS,
+    MORE,
     MOST,
     NEEDS_GAP,
     NEXT,
@@ -45,7 +47,9 @@ from .kernels_labels import (
     OPEN,
     PARENT,
     PIECES,
+    REACHED,
     REST,
+    RIVAL,
     SIGMA,
     SOLID,
     SPLITS,
@@ -61,6 +65,7 @@ from .kernels_labels import (
     power_of_two,
     slot_of,
 )
+from .kernels_pairs import hopeless, to_come
 
 Array = Any  # integer arrays; numba knows their exact types
 _MIX = np.uint64(0x9E3779B97F4A7C15)
@@ -78,7 +83,8 @@ def search(  # noqa: C901 - one flat loop: a compiled call a row would cost more
     stack: Array,  # (layers,) row of each layer, the topmost first
     spelling: Any,  # ranks of the letters of edges, heads and tails of segments
     forbidden: Array,  # (f,) hashes of columns that must not be used
-    limits: Array,  # (9,) see kernels_labels
+    limits: Array,  # (11,) see kernels_labels
+    guide: Any,  # see kernels_pairs.hopeless: pairs of rows, their costs to come, weights
     capacity: Array,  # (2,) labels, states
 ) -> Any:
     """Return (status, codes): the best alignment's borders as (columns + 1, m) row codes.
@@ -95,6 +101,9 @@ def search(  # noqa: C901 - one flat loop: a compiled call a row would cost more
             depth = max(depth, places[at, DEPTH] >> 1)
         total += depth
     order, able = _row_order(m, rows[:, SOLID])
+    ahead = _letters_ahead(m, starts, places, steps)
+    guided = len(guide[1]) > 0
+    now = np.zeros(m, np.int64)  # the place of each row that has chosen
     max_labels, max_states = capacity[0], capacity[1]
     labels = np.zeros((max_labels, 8), np.int64)
     wide = m if limits[SPLITS] else 0
@@ -103,7 +112,7 @@ def search(  # noqa: C901 - one flat loop: a compiled call a row would cost more
     head, chain = np.full(max_states, -1, np.int64), np.full(max_states, -1, np.int64)
     bucket = np.full(total + 1, -1, np.int64)
     slots = np.full(power_of_two(2 * max_states), -1, np.int64)
-    status = np.zeros(5, np.int64)
+    status = np.zeros(6, np.int64)
     status[COMPLETE] = 1
     # The empty prefix.
     status[STATES], status[LABELS] = 1, 1
@@ -143,6 +152,7 @@ def search(  # noqa: C901 - one flat loop: a compiled call a row would cost more
                                     limits, labels, reach, codes, head, chain, bucket, slots, first,
                                     status, label, state, taken, upper[m], lower[m],
                                     opaque[m], cut[m], full_low, full_high, code, grip,
+                                    starts, guide, ahead,
                                 )  # fmt: skip
                             k -= 1
                             continue
@@ -161,6 +171,13 @@ def search(  # noqa: C901 - one flat loop: a compiled call a row would cost more
                                 > limits[WIDEST]
                             ):
                                 continue
+                            if guided and hopeless(
+                                r, here, k, order, now,
+                                spare - max(np.int64(0), upper[k] - lower[k]),
+                                limits[WIDEST] - labels[label, SIGMA] - upper[k], starts, guide,
+                            ):  # fmt: skip
+                                continue
+                            now[r] = here
                             taken[r] = -1
                             upper[k + 1], lower[k + 1] = upper[k], lower[k]
                             opaque[k + 1], cut[k + 1] = opaque[k], cut[k]
@@ -206,6 +223,12 @@ def search(  # noqa: C901 - one flat loop: a compiled call a row would cost more
                             > limits[WIDEST]
                         ):
                             continue
+                        if guided and hopeless(
+                            r, there, k, order, now, spare - max(np.int64(0), largest - smallest),
+                            limits[WIDEST] - labels[label, SIGMA] - largest, starts, guide,
+                        ):  # fmt: skip
+                            continue
+                        now[r] = there
                         taken[r] = step
                         full_low[r], full_high[r] = bottom, top
                         upper[k + 1], lower[k + 1] = largest, smallest
@@ -220,6 +243,8 @@ def search(  # noqa: C901 - one flat loop: a compiled call a row would cost more
     status[BEST] = best_label(
         status[STATES], head, labels, codes, places, first, steps, spelling, limits, rows, stack
     )
+    if status[BEST] >= 0:
+        status[REACHED] = labels[status[BEST], OMEGA]
     return status, path_of(status[BEST], labels, codes)
 
 
@@ -237,12 +262,27 @@ def _row_order(m: int, solid: Array) -> Any:
 
 
 @compiled
+def _letters_ahead(m: int, starts: Array, places: Array, steps: Array) -> Any:
+    """Return the most letters that each row has, and at the end the least size of a column."""
+    out = np.zeros(m + 1, np.int64)
+    for r in range(m):
+        for at in range(starts[r], starts[r + 1]):
+            out[r] = max(out[r], places[at, DEPTH] >> 1)
+    out[m] = np.int64(2**62)
+    for step in range(len(steps)):
+        if steps[step, IS_SOLID]:
+            out[m] = min(out[m], max(np.int64(1), steps[step, LOW]))
+    return out
+
+
+@compiled
 def _finish(  # noqa: C901 - called once a column
     m: int, rows: Array, places: Array, tally: Array, keys: Array, steps: Array, spelling: Any,
     forbidden: Array, limits: Array, labels: Array, reach: Array, codes: Array, head: Array,
     chain: Array, bucket: Array, slots: Array, first: Array, status: Array,
     label: int, state: int, taken: Array, upper: int, lower: int, opaque: int, cut: int,
-    full_low: Array, full_high: Array, code: Array, grip: Array,
+    full_low: Array, full_high: Array, code: Array, grip: Array, starts: Array, guide: Any,
+    ahead: Array,
 ) -> None:  # fmt: skip
     """Check the column that every row has chosen for, and add its label."""
     if not opaque and not limits[LOOSE]:
@@ -252,6 +292,7 @@ def _finish(  # noqa: C901 - called once a column
     size = labels[label, SIGMA] + upper
     omega = labels[label, OMEGA] + max(np.int64(0), upper - lower)
     progress = np.int64(0)
+    fewest = np.int64(2**62)  # columns to come, at most
     for r in range(m):
         here, been = codes[state, r] >> 2, (codes[state, r] >> 1) & 1
         there = here if taken[r] < 0 else steps[taken[r], TO_PLACE]
@@ -271,6 +312,13 @@ def _finish(  # noqa: C901 - called once a column
         if taken[r] < 0:
             code[r] = 4 * there + 2 * rows[r, NEEDS_GAP] + places[there, ASKS]
         progress += places[there, DEPTH] >> 1
+        spare = (limits[WIDEST] - size - rest) // ahead[m]
+        fewest = min(fewest, ahead[r] - (places[there, DEPTH] >> 1) + spare)
+    if (
+        labels[label, COLUMNS] + 1 + fewest < limits[MORE]
+        and omega + to_come(m, code, starts, guide) >= limits[RIVAL]
+    ):
+        return
     if _contradicts(m, places, codes[state], code, taken, tally):
         return
     if len(forbidden):

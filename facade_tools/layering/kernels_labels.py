@@ -10,8 +10,9 @@ from ..compiled import compiled
 
 # Columns of the label table.
 OMEGA, SIGMA, PIECES, COLUMNS, PARENT, STATE, NEXT, ALIVE = range(8)
-# Entries of `limits`.
-BUDGET, WIDEST, CANVAS, SPLITS, MAX_STEPS, BEAM, LOOSE, FLOOR, SHORTEST = range(9)
+# Entries of `limits`. LOOSE: columns need no opaque substring; BARE: only Ω counts, no ties.
+# RIVAL: an Ω that is known, with MORE columns: what only ties must have as many.
+BUDGET, WIDEST, CANVAS, SPLITS, MAX_STEPS, BEAM, LOOSE, FLOOR, SHORTEST, RIVAL, MORE = range(11)
 # Columns of `places`: REST from there on, DEPTH 2 · letters + OPEN, AFTER an attached letter, ASKS:
 # before one, OPEN: inside a letter of size LEAST to MOST whose rank is that of the edge SPELT.
 # BEFORE: size of the letters before, COVER: of the opaque ones.
@@ -20,8 +21,9 @@ REST, DEPTH, AFTER, ASKS, OPEN, LEAST, MOST, FINAL, SPELT, BEFORE, COVER = range
 TO_PLACE, LOW, HIGH, IS_CLEAR, IS_SOLID, IS_BARE, HAS_GRIPS, SPELLING = range(8)
 # Columns of `rows`.
 SOLID, WEIGHT, NEEDS_GAP = range(3)
-# Entries of `status`.
-BEST, COMPLETE, STEPS, LABELS, STATES = range(5)
+# Entries of `status`; REACHED: Ω of the best label, where there is one.
+BEST, COMPLETE, STEPS, LABELS, STATES, REACHED = range(6)
+BARE = 2  # a value of limits[LOOSE]
 
 Array = Any  # integer arrays; numba knows their exact types
 _MIX = np.uint64(0x9E3779B97F4A7C15)
@@ -152,7 +154,7 @@ def better(
         for r in range(m):
             if reach[a, r, 0] < reach[b, r, 0] or reach[a, r, 1] > reach[b, r, 1]:
                 return False
-    if labels[a, OMEGA] < labels[b, OMEGA]:
+    if labels[a, OMEGA] < labels[b, OMEGA] or limits[LOOSE] == BARE:
         return True
     if labels[a, PIECES] != labels[b, PIECES]:
         return bool(labels[a, PIECES] < labels[b, PIECES])

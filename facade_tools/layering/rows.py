@@ -330,6 +330,7 @@ def _part(graph: Graph, lattice: Lattice, used: list[int], ends: Integers) -> _P
     places[:, SPELT] = -1
     inside = places[size:]
     inside[:, REST] = places[edges[:, FROM], REST]
+    inside[:, BEFORE] = low[edges[:, FROM]]
     inside[:, DEPTH] = places[edges[:, FROM], DEPTH] + 1
     inside[:, OPEN] = 1
     inside[:, LEAST] = low[edges[:, TO]] - low[edges[:, FROM]]

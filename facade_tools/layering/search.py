@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 from ..randomness import item_generator
 from .alignment import Aligner, Effort, Found, Key, Task, full_key
+from .bounds import size_floor
 from .candidates import Generator
 from .lattice import FEW_WORDS
 from .problem import SLACK, TOLERANCES, Alignment, Candidate, Direction
 from .rescue import GLANCE, Rescue
-from .words import Word
 
 BUDGETS = (0.0, 1 / 16, 1 / 4, 1.0)  # of µ: Ω is looked for from below
 QUICK = Effort(labels=20_000, steps=400_000, nodes=32, beam=24)
@@ -246,11 +246,12 @@ class GroupSearch:
             if self.clock.over():
                 return Found(best, False, 0.0)
             limit = budget if best is None else best.omega
-            if not self._hopeful(candidate, stage, limit):
-                continue
             if self._refuted.get((stage, id(candidate)), -1.0) >= limit:
                 continue
-            found = self._align(candidate, stage, limit, self.effort)
+            if not self._hopeful(candidate, stage, limit):
+                self._refuted[stage, id(candidate)] = limit
+                continue
+            found = self._align(candidate, stage, limit, self.effort, best)
             complete = complete and found.complete
             if found.complete and found.alignment is None:
                 self._refuted[stage, id(candidate)] = limit
@@ -274,67 +275,24 @@ class GroupSearch:
                 yield found.alignment
 
     def _hopeful(self, candidate: Candidate, stage: Stage, budget: float) -> bool:
-        """Tell whether a lower bound on Ω leaves room: see `least_omega`."""
+        """Tell whether the lower bounds on Ω leave room."""
         most = budget + SLACK * self.direction.canvas
-        return (
-            least_omega(self.direction, candidate, stage) <= most
-            and lacking(self.direction, candidate, stage) <= most
-        )
+        if size_floor(self.direction, candidate, stage.tolerance) > most:
+            return False
+        return not self.aligner.pairs.exceed(candidate, stage.tolerance, stage.splits, budget)
 
-    def _align(self, candidate: Candidate, stage: Stage, budget: float, effort: Effort) -> Found:
+    def _align(
+        self,
+        candidate: Candidate,
+        stage: Stage,
+        budget: float,
+        effort: Effort,
+        rival: Alignment | None = None,
+    ) -> Found:
         bounds = Generator(self.direction, self.groups, stage.tolerance).bounds(candidate.words)
-        task = Task(candidate, tuple(bounds), stage.tolerance, budget, stage.splits, effort)
+        task = Task(candidate, tuple(bounds), stage.tolerance, budget, stage.splits, effort, rival)
         return self.aligner.best(task)
 
 
 def _stage_of(alignment: Alignment) -> Stage:
     return Stage(alignment.tolerance, alignment.pieces > 0)
-
-
-def least_omega(direction: Direction, candidate: Candidate, stage: Stage) -> float:
-    """Return a lower bound on Ω (m) from the words' sizes alone.
-
-    A row that has no room for an empty column, because the smallest opaque letter is wider than
-    what the canvas and the tolerance leave it, falls short of the widest row by at most Ω.
-    """
-    box = {name: (low, high) for name, low, high in candidate.unsized}
-    least: list[float] = []
-    most: list[float] = []
-    smallest = float("inf")
-    for words in _alternatives(candidate):
-        spans = [[_span(direction, box, letter.symbol) for letter in word] for word in words]
-        least.append(min(sum(low for low, _ in each) for each in spans))
-        most.append(max(sum(high for _, high in each) for each in spans))
-        for word, each in zip(words, spans, strict=True):
-            opaque = [s[0] for s, a in zip(each, word, strict=True) if direction.is_opaque(a)]
-            smallest = min([smallest, *opaque])
-    room = direction.canvas * (1.0 + stage.tolerance + SLACK)
-    total = 0.0
-    for first, end in candidate.split():
-        widest = max(least[first:end])
-        rows = zip(least[first:end], most[first:end], strict=True)
-        total += max(0.0, *(widest - b for a, b in rows if room - a < smallest), 0.0)
-    return total
-
-
-def lacking(direction: Direction, candidate: Candidate, stage: Stage) -> float:
-    """Return another lower bound on Ω (m): the length that no opaque letter covers.
-
-    Every column has an opaque substring, which is at most ω narrower than the column.
-    """
-    floor = direction.canvas * (1.0 - stage.tolerance - SLACK)
-    opaque = [max(map(direction.opaque_size, words)) for words in _alternatives(candidate)]
-    covered = [sum(opaque[first:end]) for first, end in candidate.split()]
-    return floor - min(covered)
-
-
-def _alternatives(candidate: Candidate) -> list[tuple[Word, ...]]:
-    """Return a word for each multiset of letters that each layer may have."""
-    return [lattice.words for lattice in candidate.lattices]
-
-
-def _span(
-    direction: Direction, box: dict[str, tuple[float, float]], name: str
-) -> tuple[float, float]:
-    size = direction.rules[name].size
-    return (size, size) if size is not None else box[name]

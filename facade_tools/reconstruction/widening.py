@@ -20,7 +20,8 @@ from .texture_synthesis import cross_faded
 OPENINGS = [LABELS.index(name) for name in ("window", "door")]
 BLOCKED = 0.02  # share of a column's pixels from which it crosses an opening
 LAP = 0.25  # of the narrower wall beside a cut, where its seam may run
-USUAL = 0.6  # of the largest area of glass in an axis: from here an axis may repeat
+NARROW = 0.3  # of the median wall between openings: narrower ones are not cut
+USUAL = 0.5  # of the largest area of glass between two cuts: from here an axis may repeat
 MOST_PIXELS = 64_000_000
 
 Span = tuple[int, int]
@@ -92,14 +93,17 @@ def widened(labels: NDArray[np.uint8], ratio: float) -> Widened | None:
 def _plain(labels: NDArray[np.uint8], inner: Sequence[Span]) -> list[Span]:
     """Return the axes that may repeat: without a door, and no staircase's small windows."""
     door, window = LABELS.index("door"), LABELS.index("window")
-    glass = [int((labels[:, start:stop] == window).sum()) for start, stop in inner]
-    doors = [bool((labels[:, start:stop] == door).any()) for start, stop in inner]
-    most = max((area for area, shut in zip(glass, doors, strict=True) if not shut), default=0)
+    ends = [(0, inner[0][0]), (inner[-1][1], labels.shape[1])] if inner else []
+    most = max((_count(labels, span, window) for span in [*inner, *ends]), default=0)
     return [
         axis
-        for axis, area, shut in zip(inner, glass, doors, strict=True)
-        if not shut and area >= USUAL * most
+        for axis in inner
+        if not _count(labels, axis, door) and _count(labels, axis, window) >= USUAL * most
     ]
+
+
+def _count(labels: NDArray[np.uint8], span: Span, label: int) -> int:
+    return int((labels[:, span[0] : span[1]] == label).sum())
 
 
 def _cuts(labels: NDArray[np.uint8]) -> tuple[list[int], int]:
@@ -110,7 +114,7 @@ def _cuts(labels: NDArray[np.uint8]) -> tuple[list[int], int]:
     if not free:
         return [], 0
     usual = float(np.median([b - a for a, b in free]))
-    walls = [(a, b) for a, b in free if b - a >= 0.5 * usual]
+    walls = [(a, b) for a, b in free if b - a >= NARROW * usual]
     return [(a + b) // 2 for a, b in walls], int(LAP * min(b - a for a, b in walls))
 
 

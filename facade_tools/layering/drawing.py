@@ -20,11 +20,13 @@ Picture = NDArray[np.uint8]
 FACADE = 520.0  # pixels of the facade's longer side
 ROW = 24.0  # height of a word's row
 MARGIN = 26.0
-LABEL = 108.0  # width of the layers' names
-SHORT = 16  # characters of a name that are shown
+LABEL = 132.0  # width of the layers' names
+SHORT = 20  # characters of a name that are shown
 MOST_ROWS = 14
 LINE = "#c0392b"
 INK = "#333333"
+PALE = "#f2f2f2"
+LETTER = 5.6  # width of a character of the lines below, at most
 
 
 class Rect(NamedTuple):
@@ -56,6 +58,7 @@ class Text(NamedTuple):
     text: str
     size: float = 11.0
     start: bool = False
+    color: str = INK
 
 
 Primitive = Rect | Rule | Text
@@ -102,7 +105,9 @@ def draw(layout: Layout) -> Drawing:
         *_upwards(layout, upwards, (scale, left, top + height, width)),
         *_titles(layout, left, top + height, width),
     ]
-    return Drawing(left + width + MARGIN, top + height + MARGIN + 30, tuple(items))
+    longest = max(len(item.text) for item in _titles(layout, left, top, width))
+    wide = max(width, longest * LETTER)
+    return Drawing(left + wide + MARGIN, top + height + MARGIN + 30, tuple(items))
 
 
 def _count(groups: Sequence[Sequence[_Strip]]) -> int:
@@ -130,7 +135,8 @@ def _facade(layout: Layout, scale: float, left: float, bottom: float) -> Iterato
             label = "".join(symbol.lstrip("~") for symbol in shape.symbols)
             if len(label) <= 4 and w > 7.0 * len(label) and h > 12:
                 x = left + (shape.x0 + shape.x1) / 2 * scale
-                yield Text(x, bottom - (shape.y0 + shape.y1) / 2 * scale, label, 10.0)
+                y = bottom - (shape.y0 + shape.y1) / 2 * scale
+                yield Text(x, y, label, 10.0, color=_ink_on(fill))
 
 
 def _across(
@@ -195,7 +201,7 @@ def _boxes(strip: _Strip, group: Group) -> Iterator[tuple[str, bool, float, floa
             yield name, name.lstrip("~") in unsized, s, end if k == len(column) - 1 else t
 
 
-def _titles(layout: Layout, left: float, bottom: float, width: float) -> Iterator[Primitive]:
+def _titles(layout: Layout, left: float, bottom: float, width: float) -> Iterator[Text]:
     for axis, groups, line in (("x", layout.x, 14), ("y", layout.y, 29)):
         yield Text(left, bottom + line, f"{axis}: {_numbers(groups)}", 10.5, True)
     yield Text(left + width - 60, 12, layout.id[:24], 11.0)
@@ -207,6 +213,11 @@ def _numbers(groups: Mapping[str, Group]) -> str:
     error = sum(g.alignment_error for g in groups.values())
     proved = "optimal" if all(g.optimal for g in groups.values()) else "not proved"
     return f"error {error:.3f}, {group.tolerance:.0%}, {proved}; {sizes}"
+
+
+def _ink_on(fill: str) -> str:
+    """Return a colour that can be read on another."""
+    return PALE if sum(_rgb(fill)) < 330 else INK
 
 
 def _tint(name: str, clear: bool) -> str:
@@ -239,9 +250,9 @@ def _svg(item: Primitive) -> str:
         case Rule(x0, y0, x1, y1, color):
             place = f'x1="{x0:.2f}" y1="{y0:.2f}" x2="{x1:.2f}" y2="{y1:.2f}"'
             return f'<line {place} stroke="{color}" stroke-width="0.8" stroke-opacity="0.7"/>'
-        case Text(x, y, text, size, start):
+        case Text(x, y, text, size, start, color):
             anchor = "start" if start else "middle"
-            look = f'font-size="{size}" text-anchor="{anchor}" fill="{INK}"'
+            look = f'font-size="{size}" text-anchor="{anchor}" fill="{color}"'
             return f'<text x="{x:.2f}" y="{y + size * 0.36:.2f}" {look}>{escape(text)}</text>'
 
 
@@ -270,12 +281,12 @@ def _paint(page: Picture, item: Primitive, zoom: int) -> None:
         case Rule(x0, y0, x1, y1, color):
             ends = [(round(x * zoom), round(y * zoom)) for x, y in ((x0, y0), (x1, y1))]
             cv2.line(page, ends[0], ends[1], _rgb(color), 1, cv2.LINE_AA)
-        case Text(x, y, text, size, start):
+        case Text(x, y, text, size, start, color):
             plain = text.encode("ascii", "replace").decode()
             factor, font = size * zoom / 30.0, cv2.FONT_HERSHEY_SIMPLEX
             (width, height), _ = cv2.getTextSize(plain, font, factor, 1)
             at = round(x * zoom) - (0 if start else width // 2), round(y * zoom + height / 2)
-            cv2.putText(page, plain, at, font, factor, _rgb(INK), 1, cv2.LINE_AA)
+            cv2.putText(page, plain, at, font, factor, _rgb(color), 1, cv2.LINE_AA)
 
 
 def _rgb(color: str) -> tuple[int, int, int]:

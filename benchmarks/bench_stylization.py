@@ -7,7 +7,8 @@ area of the remesh over those of the model's own sections (polygons of shapely a
 courts count as filled on both sides), mean SSIM of four orthographic facade renders of the
 self-retarget against the source (160×160 pixels, 4×4 rays each, both blurred by one pixel, 8×8
 windows), period of the front's columns by autocorrelation (m): of the source, of the copy, of the
-copy 1.5 times as wide (each time the peak nearest to the source's), the widths of windows there,
+copy 1.5 times as wide in pixels of the same size (each time the peak nearest to the source's), the
+widths of windows there,
 and seconds of processor time. `--pictures` draws source, copy, 1.5 times as wide and 1.6 times as
 high.
 """
@@ -43,18 +44,26 @@ SIZE, RAYS = 160, 4
 
 
 def facade_renders(
-    mesh: TexturedMesh, low: np.ndarray, high: np.ndarray, sides: Sequence[str] = tuple(SIDES)
+    mesh: TexturedMesh,
+    box: tuple[np.ndarray, np.ndarray],
+    sides: Sequence[str] = tuple(SIDES),
+    size: int = SIZE,
 ) -> list[np.ndarray]:
-    """Return orthographic views of sides inside the box low…high, background white."""
+    """Return orthographic views of sides inside the box (low, high), background white."""
     paints = palette(mesh)
-    return [_render(mesh, paints, side, low, high) for side in sides]
+    return [_render(mesh, paints, side, box, size) for side in sides]
 
 
 def _render(
-    mesh: TexturedMesh, paints: Palette, side: str, low: np.ndarray, high: np.ndarray
+    mesh: TexturedMesh,
+    paints: Palette,
+    side: str,
+    box: tuple[np.ndarray, np.ndarray],
+    size: int,
 ) -> np.ndarray:
+    low, high = box
     along, direction, depth, sign = SIDES[side]
-    side_pixels = SIZE * RAYS
+    side_pixels = size * RAYS
     scale = side_pixels / max(high[along] - low[along], high[2] - low[2])
     corners = mesh.vertices[mesh.faces]
     start = low[along] if direction > 0 else -high[along]
@@ -71,7 +80,7 @@ def _render(
     nearest = np.full((side_pixels, side_pixels), 1e9)
     uv = np.where(np.isfinite(mesh.uv), mesh.uv, 0.0)
     _rasterise(view, uv, mesh.paint, paints.pixels, paints.table, picture, nearest)
-    return cv2.resize(picture, (SIZE, SIZE), interpolation=cv2.INTER_AREA)
+    return cv2.resize(picture, (size, size), interpolation=cv2.INTER_AREA)
 
 
 def grey(picture: np.ndarray) -> np.ndarray:
@@ -176,6 +185,11 @@ def bounds(mesh: TexturedMesh) -> tuple[np.ndarray, np.ndarray]:
     return used.min(axis=0), used.max(axis=0)
 
 
+def largest(box: tuple[np.ndarray, np.ndarray]) -> float:
+    """Return the larger of width and height of a box (m)."""
+    return float(max(box[1][0] - box[0][0], box[1][2] - box[0][2]))
+
+
 def counts(style: Style) -> str:
     """Return how many wide groups have windows, and the worst width at ×1.5 and ×2 (share)."""
     worst = 0.0
@@ -206,26 +220,26 @@ def measure(path: Path) -> tuple[str, np.ndarray]:
         standing(s, frame) for s in (scene, bigger(style, (1.5, 1, 1)), bigger(style, (1, 1, 1.6)))
     )
     box = bounds(standard.mesh)
-    pairs = list(zip(facade_renders(standard.mesh, *box), facade_renders(copy, *box), strict=True))
+    pairs = list(zip(facade_renders(standard.mesh, box), facade_renders(copy, box), strict=True))
     likeness = np.mean([ssim(grey(a), grey(b)) for a, b in pairs])
-    scale = max(box[1][0] - box[0][0], box[1][2] - box[0][2]) / SIZE
-    wide_box = bounds(wide)
-    wide_scale = max(wide_box[1][0] - wide_box[0][0], wide_box[1][2] - wide_box[0][2]) / SIZE
-    wide_front = facade_renders(wide, *wide_box, ["front"])[0]
+    scale = largest(box) / SIZE
+    size = round(largest(bounds(wide)) / scale)  # pixels of the same size as the source's
+    wide_front = facade_renders(wide, bounds(wide), ["front"], size)[0]
     own = period(grey(pairs[0][0]), scale)
-    periods = own, period(grey(pairs[0][1]), scale, own), period(grey(wide_front), wide_scale, own)
+    periods = own, period(grey(pairs[0][1]), scale, own), period(grey(wide_front), scale, own)
     reference = np.array(outlined(standard.mesh.vertices, standard.mesh.faces))
     kept = np.array(remeshed(style)) / reference
     faces = sum(len(wall.faces) for wall in style.sheet.walls)
     row = (
         f"{path.parent.name[:34]:34} {len(mesh.faces):6} {len(capture.blocks.blocks):3} "
         f"{faces:5} {capture.sheet.lost:5.0%} {kept[0]:6.3f} {kept[1]:6.3f} {likeness:6.3f}  "
-        f"{periods[0]:6.2f} {periods[1]:6.2f} {periods[2]:6.2f} {wide_scale:6.2f}  "
+        f"{periods[0]:6.2f} {periods[1]:6.2f} {periods[2]:6.2f} {scale:6.2f}  "
         f"{counts(style)}  "
         f"{captured - start:5.2f} {done - captured:5.2f}"
     )
-    views = [pairs[0][0], pairs[0][1], pairs[1][0], pairs[1][1], wide_front]
-    return row, np.hstack([*views, facade_renders(high, *bounds(high), ["front"])[0]])
+    small = cv2.resize(wide_front, (SIZE, SIZE), interpolation=cv2.INTER_AREA)
+    views = [pairs[0][0], pairs[0][1], pairs[1][0], pairs[1][1], small]
+    return row, np.hstack([*views, facade_renders(high, bounds(high), ["front"])[0]])
 
 
 def main() -> None:

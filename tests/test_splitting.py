@@ -18,6 +18,7 @@ from facade_tools.stylization.splitting import (
     two_means,
     variance_signal,
 )
+from facade_tools.stylization.synthesis import at_scale
 
 signals = st.lists(st.floats(0, 1), min_size=2, max_size=9).map(np.array)
 widths = st.floats(0.2, 4)
@@ -116,3 +117,13 @@ def test_equation_8_and_9_by_hand():
     assert split(rule, 1.0).windows == 0
     crowded = split(rule, 4.1)  # both windows fit, but with 3 cm of wall: one is nearer to 1
     assert crowded.windows == 1
+
+
+@pytest.mark.parametrize("stretch", [0.4, 0.8, 1.0, 1.3, 2.5, 3.0])
+def test_long_walls_keep_the_scale_of_what_is_on_them(stretch):
+    """At every place the picture runs at its own scale, forth or back, from end to end."""
+    places = at_scale(np.linspace(0, 1, 5001), stretch)
+    step = np.abs(np.diff(places)) * 5000 / stretch
+    assert np.mean(np.abs(step - 1) < 0.01) > 0.999
+    assert (places[0], places[-1]) == pytest.approx((0, 1))
+    assert 0 <= places.min() <= places.max() <= 1

@@ -17,6 +17,7 @@ from .splitting import SplitRule, end_wall, split, variance_signal
 
 PLAIN = 0.5  # of a wall beside windows, that a face without windows is made of
 TOLERATED = 0.1  # stretch of a texture in which no windows were found
+LONG = 3.0  # m: walls that keep the scale of what is on them when they are stretched by more
 SMEARED = 2.0  # stretch of walls beyond which their texture repeats
 Part = tuple[tuple[float, float], tuple[float, float]]  # shares: left and right, top and bottom
 WHOLE: Part = ((0.0, 1.0), (0.0, 1.0))
@@ -65,7 +66,9 @@ def positions(
     index = np.array(done.sources)[section]
     wall = index % 2 == 0
     index = np.where((section == len(done.sizes) - 1) & (share >= 0.5), end_wall(own, done), index)
-    share = np.where(wall, _to_and_fro(share, done.stretch), share)
+    long = wall & (widths[index] > LONG) & (abs(done.stretch - 1) > TOLERATED)
+    share = np.where(wall & ~long, _to_and_fro(share, done.stretch), share)
+    share = np.where(long, at_scale(share, done.stretch), share)
     places: Floats = np.clip((starts[index] + share * widths[index]) / source, 0.0, 1.0)
     return places
 
@@ -134,6 +137,22 @@ def _signal(picture: Picture, axis: int) -> Floats:
     """Return the variance signal of a picture, thinned to at most 256 lines."""
     step = max(1, picture.shape[axis] // 256)
     return variance_signal(picture[::step] if axis == 0 else picture[:, ::step], axis)
+
+
+def at_scale(share: Floats, stretch: float) -> Floats:
+    """Bring a section to a new size at its own scale; both its ends stay where they were.
+
+    What is shorter leaves its middle out; what is longer runs back over its middle.
+    """
+    place = share * stretch
+    if stretch < 1:
+        return np.where(share < 0.5, place, place + 1 - stretch)
+    if stretch > 3:
+        return _to_and_fro(share, stretch)
+    back = 0.5 * (stretch - 1)
+    turn = 0.5 + 0.5 * back
+    middle = np.where(place < turn + back, 2 * turn - place, place - 2 * back)
+    return np.where(place < turn, place, middle)
 
 
 def shape_of(target: tuple[float, float], density: float, part: Part = WHOLE) -> tuple[int, int]:

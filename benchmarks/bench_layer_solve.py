@@ -1,13 +1,14 @@
 """How long `layer-solve` takes, and how far it agrees with the brute force of the tests.
 
-Usage: python benchmarks/bench_layer_solve.py [--hard] [--oracle N [--first SEED]]; without
-either, the sample designs. Seconds are of CPU time.
+Usage: python benchmarks/bench_layer_solve.py [--hard] [--oracle N] [--first SEED]; without either,
+the sample designs. Seconds are of CPU time.
 """
 
 from __future__ import annotations
 
 import argparse
 import random
+import resource
 import sys
 import time
 from collections import Counter
@@ -48,10 +49,10 @@ def samples() -> None:
         print(ratio if path.stem == "concert-hall" else "")
 
 
-def hard(seconds: float) -> None:
+def hard(seconds: float, first: int) -> None:
     """Answer under-constrained designs: free counters, alternations, very different sizes."""
     proved = answered = 0
-    for seed in range(30):
+    for seed in range(first, first + 30):
         problem = underconstrained(random.Random(seed))
         start = time.process_time()
         clock = Clock(start + seconds, now=time.process_time)  # of CPU: other work counts nothing
@@ -64,7 +65,8 @@ def hard(seconds: float) -> None:
         if answer is not None:
             what = f"{answer.alignment.omega:.3f} {answer.optimal}"
         print(f"under-constrained {seed:2}: {spent:6.2f} s  error {what}", flush=True)
-    print(f"answered {answered} of 30, proved optimal {proved}")
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(f"answered {answered} of 30, proved optimal {proved}; at most {memory:.0f} MB")
 
 
 def underconstrained(rng: random.Random) -> Direction:
@@ -128,7 +130,7 @@ def compared(
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--oracle", type=int, default=0, help="random designs to compare")
-    parser.add_argument("--first", type=int, default=0, help="seed of the first of them")
+    parser.add_argument("--first", type=int, default=0, help="seed of the first design")
     parser.add_argument("--hard", action="store_true", help="30 under-constrained designs")
     parser.add_argument("--seconds", type=float, default=10.0, help="time limit of each of them")
     options = parser.parse_args()
@@ -136,6 +138,6 @@ if __name__ == "__main__":
     if not (options.oracle or options.hard):
         samples()
     if options.hard:
-        hard(options.seconds)
+        hard(options.seconds, options.first)
     if options.oracle:
         oracle(options.oracle, options.first, options.seconds)

@@ -23,7 +23,7 @@ from .style import Style
 
 OFF = 0.02  # m: what stands off its plane by more is relief
 SHARE = 0.15  # of the height that has relief somewhere, for a block to have bays
-FINE = 0.02  # m: places of the depth signal
+FINE, MOST = 0.02, 4000  # m: places of the depth signal, and how many at most
 NARROWEST, WIDEST = 0.2, 8.0  # m: of a bay; wider relief is a wing, and stretches with its block
 CORNERS = 0.2  # of a wall in the plane of its corners, for that to be its plane
 SAME = 0.01  # change of size that leaves all as it is
@@ -53,7 +53,7 @@ def relief_bays(floors: Sequence[StyleFloor], axis: int, size: float) -> Bays | 
     axis: 0 for x, 1 for y. size: of the block along it (m).
     """
     height = sum(floor.top - floor.bottom for floor in floors)
-    count = max(8, round(size / FINE))
+    count = min(max(8, round(size / FINE)), MOST)
     places = (np.arange(count) + 0.5) * size / count
     relief = np.zeros(count)
     for floor in floors:
@@ -62,15 +62,26 @@ def relief_bays(floors: Sequence[StyleFloor], axis: int, size: float) -> Bays | 
         return None
     labels = insertable_labels(relief / relief.max())
     labels = merged(labels, 2 * NARROWEST / size * count, MULLION / size * count)
-    rule = rule_of(labels, size)
+    lines = [floor.xs if axis == 0 else floor.ys for floor in floors]
+    rule = _snapped(rule_of(labels, size), np.unique(np.concatenate(lines)), 2 * size / count)
     if not rule.insertable or max(rule.insertable) > WIDEST:
         return None
-    lines = [floor.xs if axis == 0 else floor.ys for floor in floors]
     low, high = max(line[0] for line in lines), max(size - line[-1] for line in lines)
     first, *inner, last = rule.scalable
     if low > first or high > last or sum(rule.scalable) < LEAST_WALL * size:
         return None  # some floor is narrower: no bay can stand there
     return Bays(low, SplitRule((first - low, *inner, last - high), rule.insertable), high)
+
+
+def _snapped(rule: SplitRule, lines: Floats, reach: float) -> SplitRule:
+    """Move the borders between sections to lines of the plans within reach (m)."""
+    widths = np.empty(2 * len(rule.insertable) + 1)
+    widths[::2], widths[1::2] = rule.scalable, rule.insertable
+    borders = np.cumsum(widths)[:-1]
+    nearest = lines[np.abs(lines[None] - borders[:, None]).argmin(axis=1)]
+    borders = np.where(np.abs(nearest - borders) <= reach, nearest, borders)
+    exact = np.diff(np.concatenate([[0.0], np.maximum.accumulate(borders), [rule.size]]))
+    return SplitRule(tuple(exact[::2].tolist()), tuple(exact[1::2].tolist()))
 
 
 def _off_plane(floor: StyleFloor, axis: int, places: Floats) -> Booleans:

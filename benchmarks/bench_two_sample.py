@@ -26,7 +26,7 @@ from peers_density import Columns, columns, draw_products, fit_products, fit_ste
 from scipy.optimize import linear_sum_assignment
 from sklearn.ensemble import HistGradientBoostingClassifier
 from sklearn.metrics import roc_auc_score
-from sklearn.model_selection import cross_val_predict
+from sklearn.model_selection import StratifiedKFold, cross_val_predict
 
 from facade_tools.artifacts.store import read
 from facade_tools.exteriors.coordinates import Readings, read_attributes
@@ -68,7 +68,8 @@ def auc(real: np.ndarray, fake: np.ndarray) -> float:
     """Return the cross-validated AUC of a gradient-boosted classifier."""
     x, y = np.concatenate([real, fake]), np.repeat([1, 0], len(real))
     judge = HistGradientBoostingClassifier(max_iter=60, random_state=0)
-    chance = cross_val_predict(judge, x, y, cv=5, method="predict_proba")[:, 1]
+    folds = StratifiedKFold(5, shuffle=True, random_state=0)  # pairs must not share their folds
+    chance = cross_val_predict(judge, x, y, cv=folds, method="predict_proba")[:, 1]
     return float(roc_auc_score(y, chance))
 
 

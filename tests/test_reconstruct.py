@@ -357,3 +357,9 @@ def test_a_wide_footprint_has_more_axes_and_nothing_is_seen_twice():
         for piece in made.building().facades["front"].pieces
         for element in piece.elements
     )
+
+
+def test_dormers_at_the_picture_s_edge_show_the_photograph():
+    edge = tuple(Region("window", x, 28, x + 12, 42) for x in (0, WIDTH - 12))
+    made = reconstruct(parsed(regions=regions() + edge), picture(), rng=rng())
+    assert {"glass", "trim"}.isdisjoint(mesh.material for mesh in made.scene().meshes)

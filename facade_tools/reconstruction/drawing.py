@@ -74,7 +74,11 @@ def derived_scene(derived: Derived, name: str, look: Look | None = None) -> Scen
             details += balcony(leaf, look)
         else:
             _cover(skins, leaf, look)
-    details += [mesh for opening in openings if opening.name not in drawn
+    painted = {
+        leaf.name for leaf in derived.leaves
+        if leaf.terminal.label in OPEN and look.paint(leaf, leaf.faces.points, UP) is not None
+    }  # fmt: skip
+    details += [mesh for opening in openings if opening.name not in drawn | painted
                 for mesh in _inserted(opening, opening.frame)]  # fmt: skip
     meshes = [mass_mesh(recessed), *skins.meshes(), *details]
     return Scene(name, tuple(meshes), _materials(derived, look, meshes))

@@ -18,7 +18,7 @@ from facade_tools.randomness import item_generator
 from facade_tools.reconstruction.elevation import building_lines, elevation, label_map, stretched
 from facade_tools.reconstruction.engine import Lot
 from facade_tools.reconstruction.reconstruct import Ask, reconstruct
-from facade_tools.reconstruction.surfaces import largest_rectangle
+from facade_tools.reconstruction.surfaces import largest_rectangle, without_rim
 from facade_tools.reconstruction.texture_synthesis import cheapest_cut, joined, quilted
 from facade_tools.reconstruction.widening import widened
 
@@ -363,3 +363,15 @@ def test_dormers_at_the_picture_s_edge_show_the_photograph():
     edge = tuple(Region("window", x, 28, x + 12, 42) for x in (0, WIDTH - 12))
     made = reconstruct(parsed(regions=regions() + edge), picture(), rng=rng())
     assert {"glass", "trim"}.isdisjoint(mesh.material for mesh in made.scene().meshes)
+
+
+def test_the_rim_of_a_rectified_picture_is_filled():
+    shown = picture()
+    assert without_rim(shown) is shown
+    rimmed = shown.copy()
+    rimmed[:, :20], rimmed[-12:] = 0, 128
+    whole = without_rim(rimmed)
+    assert not (whole[:, :15].max(axis=2) < 14).any()
+    assert not (np.abs(whole[-10:].astype(int) - 128).max(axis=2) < 6).all()
+    assert np.array_equal(whole[:140, 40:], shown[:140, 40:])
+    assert without_rim(np.zeros((40, 40, 3), np.uint8)).max() == 0

@@ -21,7 +21,14 @@ from .elevation import Elevation, elevation, label_map, stretched
 from .engine import Derived, Leaf, Lot, derive
 from .records import derivation_of
 from .specific import Cover, Design, Specific, specific_grammar
-from .surfaces import TILE_METRES, Surfaces, canvas_of, colors_of, surfaces_of
+from .surfaces import (
+    TILE_METRES,
+    Surfaces,
+    canvas_of,
+    colors_of,
+    surfaces_of,
+    without_rim,
+)
 from .widening import widened
 
 DEPTH = 12.0  # metres, of the default footprint
@@ -94,7 +101,7 @@ def reconstruct(
     """
     ask = ask or Ask()
     labels = label_map(parse)
-    picture = _rectified(photo, parse, labels.shape)
+    picture = without_rim(_rectified(photo, parse, labels.shape))
     plan = elevation(parse, ask.storey_height, ask.height)
     more = None
     if lots:

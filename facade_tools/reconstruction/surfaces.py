@@ -13,6 +13,7 @@ from ..artifacts.parse import LABELS
 from ..geometry.mesh import Material
 from ..imaging.image_io import Picture, encoded
 from .elevation import Elevation, Rect
+from .evidence import rim
 from .specific import FRONT, PHOTO, ROOF, SIDE, WALL, Axis
 from .texture_synthesis import joined, median_color, quilted
 
@@ -21,6 +22,7 @@ TILE = 256  # pixels of a synthesised tile
 TILE_METRES = 4.0  # metres that it covers
 LEAST_BLOCK = 36  # pixels of a patch
 MOST_AXES = 4
+RIM = 0.012  # share of a picture's width beside its rim that the interpolation darkened
 SEAM = 0.12  # share of an axis' width in which its seam may run
 COLORS = {
     "wall": "#cdbf9f", "roof": "#6b727c", "chimney": "#97503e", "balcony": "#3a3c42",
@@ -107,6 +109,26 @@ def colors_of(picture: Picture, labels: Labels) -> dict[str, str]:
         label: median_color(picture[labels == LABELS.index(label)], default)
         for label, default in COLORS.items()
     }
+
+
+def without_rim(picture: Picture) -> Picture:
+    """Return a rectified picture whose black or grey rim is a mirror image of the rest."""
+    hidden = rim(picture)
+    if not hidden.any():
+        return picture
+    reach = np.ones((2 * round(RIM * picture.shape[1]) + 1,) * 2, np.uint8)
+    hidden = cv2.dilate(hidden.astype(np.uint8), reach) > 0
+    out = picture.copy()
+    filled = np.flatnonzero(~hidden.all(axis=1))
+    for y in filled.tolist():
+        seen = np.flatnonzero(~hidden[y])
+        left, right = int(seen[0]), int(seen[-1]) + 1
+        if right - left < hidden.shape[1]:
+            ends = ((left, hidden.shape[1] - right), (0, 0))
+            out[y] = np.pad(out[y, left:right], ends, mode="symmetric")
+    for y in np.flatnonzero(hidden.all(axis=1)).tolist() if len(filled) else []:
+        out[y] = out[filled[int(np.abs(filled - y).argmin())]]
+    return out
 
 
 # --- the front ------------------------------------------------------------------------------------

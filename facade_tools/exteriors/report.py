@@ -17,12 +17,13 @@ from .holdout import Comparison
 from .layout import Layout
 from .sampling import draw_block
 from .serialisation import network_of
+from .shared_values import shared_values
 from .style_pictures import StylePicture
 
-STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:70em;margin:2em auto;padding:0 1em;
+STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:78em;margin:2em auto;padding:0 1em;
 color:#222}h1,h2{font-weight:600}table{border-collapse:collapse}td,th{padding:.2em .8em;
 text-align:right;border-bottom:1px solid #ddd}td:first-child,th:first-child{text-align:left}
-.columns{display:flex;flex-wrap:wrap;gap:0 3em}figcaption{font-size:13px;color:#555}
+.columns{display:flex;flex-wrap:wrap;gap:0 2em}figcaption{font-size:13px;color:#555}
 figure{display:inline-block;margin:.5em;max-width:30em}svg{background:#fff}"""
 DATA, DRAWN = "#8aa4c8", "#c2553f"
 BINS = 24
@@ -196,7 +197,8 @@ def marginals(model: Model, rows: Sequence[Attributes], seed: int) -> Iterator[s
     """Yield one histogram a coordinate, data and samples overlaid, atoms at their own values."""
     network = network_of(model)
     data = read_attributes(rows, network.layout)
-    drawn = draw_block(network, rng=item_generator(seed, "report")).readings
+    rng, shared = item_generator(seed, "report"), shared_values(model, network)
+    drawn = draw_block(network, rng=rng, shared=shared).readings
     for name, ours, theirs in _columns(network.layout, data, drawn):
         if len(ours) and len(theirs):
             yield figure(histogram(ours, theirs), name)

@@ -14,6 +14,7 @@ from .conditioning import draw_given, resampled
 from .coordinates import Bits, Floats, Readings, read_attributes
 from .dataset import Masks
 from .groups import Group, least_bdry
+from .layout import Layout
 from .network import Network
 from .physical import Columns, settle
 from .sampling import Draws
@@ -70,7 +71,7 @@ def accept(rows: Readings, network: Network, given: Attributes, held: tuple[Bits
     """Settle rows in place and tell which (n,) are possible with what is given (`held`)."""
     layout = network.layout
     _solve(rows, layout_columns(rows, network), given)
-    settle(rows.values, layout, held)
+    settle(rows.values, layout, _with_solved(held, layout, given))
     columns = layout_columns(rows, network)
     good = np.ones(len(rows), dtype=np.bool_)
     sizes = columns.get("width", "depth", "height")
@@ -115,6 +116,17 @@ def _solve(rows: Readings, columns: Columns, given: Attributes) -> None:
     if sides and given.mass.bdry is not None and None in known:
         w, d, bcr, x = sides
         x[:] = given.mass.bdry / least_bdry(w, d, bcr)
+
+
+def _with_solved(held: tuple[Bits, ...], layout: Layout, given: Attributes) -> tuple[Bits, ...]:
+    """Return what must stay, with the floors that `_solve` has found for a given far."""
+    if given.mass.far is None or given.mass.arf[1] is not None:
+        return held
+    floors = [[c.name in ("r1", "r2") for c in group.coordinates] for group in layout.groups]
+    return tuple(
+        np.maximum(mask, np.array(row, dtype=np.int8))
+        for mask, row in zip(held, floors, strict=True)
+    )
 
 
 # --- values as they came ------------------------------------------------------------------------

@@ -15,6 +15,7 @@ from ..geometry.arrays import Booleans, Floats
 SMOOTHNESS = 0.025  # λ of eq. 3
 END = 0.3  # of the wall that it stands for: the least last wall of a rule
 CROWDED = 0.9  # S_r below this: more windows fit than look right
+TIGHT = 0.2  # of their width that the walls beside a single window keep at least
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,8 +138,9 @@ def split(rule: SplitRule, size: float) -> Split:
     """Cut a face of `size` metres: repeat insertable sections, scale the others (eq. 8 and 9).
 
     Eq. 8 packs as many windows as fit. Where the scalable sections would be squeezed below 90% or
-    stretched beyond 111%, the number of windows whose |log S_r| is least is taken instead. Windows
-    keep their size, unless the rule has no walls at all.
+    stretched beyond 111%, the number of windows whose |log S_r| is least is taken instead; rather
+    than none, one whose walls keep a fifth of their width. Windows keep their size, unless the
+    rule has no walls at all.
     """
     if not rule.insertable:
         return Split((0,), (size,), 0, size / rule.size)
@@ -147,7 +149,9 @@ def split(rule: SplitRule, size: float) -> Split:
     if CROWDED <= chosen.stretch <= 1 / CROWDED:
         return chosen
     options = (_arranged(rule, size, count) for count in range(packed + 1, -1, -1))
-    return min(options, key=lambda option: abs(math.log(max(option.stretch, 1e-9))))
+    best = min(options, key=lambda option: abs(math.log(max(option.stretch, 1e-9))))
+    single = _arranged(rule, size, 1)
+    return single if not best.windows and TIGHT <= single.stretch < 1 else best
 
 
 def split_rule(rule: SplitRule, size: float) -> SplitRule:

@@ -98,7 +98,8 @@ def _places(
             continue
         free: BaseGeometry = outline.buffer(-MARGIN, join_style="mitre")
         for other, _ in held.get(index, ()):
-            free = free.difference(_in_frame(other, opening.frame).buffer(MARGIN / 2))
+            if _near(other, opening):
+                free = free.difference(_in_frame(other, opening.frame).buffer(MARGIN / 2))
         shape = _simple(whole.intersection(free))
         if shape is not None and shape.area > 0.2 * whole.area:
             yield index, shape, min(RECESS, 0.7 * float(outline.boundary.distance(shape)))
@@ -118,6 +119,16 @@ def _in_frame(other: Opening, frame: LocalFrame) -> Polygon:
     """Return the other opening's outline in a parallel frame of the same wall."""
     shift = ((other.frame.origin - frame.origin) @ frame.axes.T)[:2]
     return Polygon(np.array(other.ring) + shift)
+
+
+def _near(other: Opening, opening: Opening) -> bool:
+    """Whether two openings of one wall may touch: hundreds stand in a tower's wall."""
+    shift = ((other.frame.origin - opening.frame.origin) @ opening.frame.axes.T)[:2]
+    (u0, v0, u1, v1), (a0, b0, a1, b1) = opening.rectangle, other.rectangle
+    du, dv = float(shift[0]), float(shift[1])
+    across = min(u1, a1 + du) - max(u0, a0 + du)
+    up = min(v1, b1 + dv) - max(v0, b0 + dv)
+    return min(across, up) > -MARGIN
 
 
 def _outline(solid: Solid, index: int, frame: LocalFrame) -> Polygon | None:

@@ -13,6 +13,8 @@ import click
 
 from facade_tools.errors import FacadeError
 
+from ._interrupts import check
+
 LOGGER = "facade_tools"
 PATIENCE = 1.0  # seconds before a bar appears
 
@@ -122,6 +124,7 @@ class Progress:
 
     def advance(self, fraction: float | None = None, *, items: int = 1) -> None:
         """Count items that are done; `fraction` of all the work, where it is known."""
+        check()
         self.count += items
         now = time.monotonic()
         if self.enabled and now - self.start > PATIENCE and now - self.shown > 0.1:

@@ -66,5 +66,8 @@ def run() -> None:
     """Entry point of the `facade` script."""
     import signal
 
+    from ._interrupts import install
+
+    install()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     sys.exit(main(sys.argv[1:]))

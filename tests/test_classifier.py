@@ -140,12 +140,14 @@ def test_classifiers_learn_round_trip_and_are_the_same_again(kind, request, pair
     data = save(classifier)
     again = decoded(data)
     assert save(again) == data
-    belief = again.probabilities(again.working(pairs[0].picture))
-    assert belief.shape[0] == len(classifier.classes)
-    np.testing.assert_allclose(belief.sum(axis=0), 1, atol=1e-3)
-    found = np.array([LABELS.index(name) for name in again.classes])[belief.argmax(axis=0)]
-    known = pairs[0].labels > 0
-    assert (found == pairs[0].labels)[known].mean() > 0.5
+    labels, shares = np.array([LABELS.index(name) for name in again.classes]), []
+    for pair in pairs:
+        belief = again.probabilities(again.working(pair.picture))
+        assert belief.shape[0] == len(classifier.classes)
+        np.testing.assert_allclose(belief.sum(axis=0), 1, atol=1e-3)
+        known = pair.labels > 0
+        shares.append((labels[belief.argmax(axis=0)] == pair.labels)[known].mean())
+    assert np.mean(shares) > 0.6
 
 
 def test_training_is_deterministic(pairs):

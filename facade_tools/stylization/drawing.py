@@ -19,6 +19,7 @@ from ..imaging.image_io import Picture
 from .groups import mean_picture
 from .projection import SIDES
 from .splitting import SplitRule, variance_signal
+from .style import group_rule
 from .synthesis import resized_rule
 
 PANEL = 320  # pixels of the larger side of an elevation
@@ -191,15 +192,9 @@ def _painted(
 
 def _windows(sheet: StyleSheet, face: StyleFace, columns: int, rows: int) -> Picture:
     """Return where an insertable column meets an insertable row (rows, columns), boolean."""
-    across = _inside(_rule(sheet, face.vertical), abs(face.end - face.start), columns)
-    down = _inside(_rule(sheet, face.horizontal), face.top - face.bottom, rows)
+    across = _inside(group_rule(sheet, face.vertical), abs(face.end - face.start), columns)
+    down = _inside(group_rule(sheet, face.horizontal), face.top - face.bottom, rows)
     return np.asarray(down[:, None] & across[None])
-
-
-def _rule(sheet: StyleSheet, group: str) -> SplitRule:
-    name = next(g.rule for g in sheet.groups if g.id == group)
-    rule = next(r for r in sheet.rules if r.id == name)
-    return SplitRule(rule.a, rule.b)
 
 
 def _inside(rule: SplitRule, size: float, pixels: int) -> Picture:
@@ -233,7 +228,7 @@ def _signal(sheet: StyleSheet, pictures: Mapping[str, Picture], width: int) -> P
     top = 2 * LINE + STRIP
     strip[top : top + STRIP, MARGIN : MARGIN + columns] = texture
     size = max(abs(face.end - face.start) for face in members[name])
-    labels = _inside(_rule(sheet, name), size, columns)
+    labels = _inside(group_rule(sheet, name), size, columns)
     colors = np.where(labels[:, None], (226, 138, 52), (86, 124, 178))
     strip[top + STRIP : top + STRIP + STRIP // 2, MARGIN : MARGIN + columns] = colors
     return strip

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..artifacts.building import Building
-from ..artifacts.stylesheet import StyleFace, StyleSheet
+from ..artifacts.stylesheet import StyleFace
 from ..geometry.arrays import Floats, Points3
 from ..geometry.details import crown_scene
 from ..geometry.mesh import Material, Mesh, Scene
@@ -19,9 +19,9 @@ from ..geometry.triangulate import newell_normal
 from ..imaging.image_io import Picture
 from .atlas import encoded_page
 from .bases import frame_of
-from .retarget import RAISED
+from .retarget import RAISED, framed
 from .splitting import SplitRule
-from .style import Style
+from .style import Style, group_rule
 from .synthesis import resized_rule
 
 if TYPE_CHECKING:
@@ -44,12 +44,12 @@ def crowned(scene: Scene, style: Style, building: Building) -> Scene:
     crown = crown_scene(building, solid if pitched else None)
     meshes, materials = list(crown.meshes), dict(crown.materials)
     if pitched:
-        attic = _framed(_attic(building, solid), frame_of(building))
+        attic = framed(_attic(building, solid), frame_of(building))
         scene = replace(scene, meshes=tuple(_united(mesh, attic) for mesh in scene.meshes))
         picture, size = plain_wall(style)
         meshes.append(_gables(building, solid, size))
         materials["gable"] = Material("gable", "#ffffff", texture=encoded_page(picture))
-    meshes = [_framed(mesh, frame_of(building)) for mesh in meshes]
+    meshes = [framed(mesh, frame_of(building)) for mesh in meshes]
     used = {mesh.material for mesh in meshes}
     kept = {f"own-{name}": replace(materials[name], name=f"own-{name}") for name in sorted(used)}
     own = [replace(m, material=f"own-{m.material}") for m in meshes if len(m.faces)]
@@ -79,11 +79,6 @@ def _united(mesh: Mesh, attic: Mesh) -> Mesh:
         return mesh
     whole = _mesh((_manifold(mesh) + _manifold(attic)).simplify(SLIVER))
     return replace(mesh, vertices=whole.vertices, faces=whole.faces)
-
-
-def _framed(mesh: Mesh, frame: tuple[tuple[float, ...], ...] | None) -> Mesh:
-    turn = np.eye(4) if frame is None else np.array(frame)
-    return replace(mesh, vertices=mesh.vertices @ turn[:3, :3].T + turn[:3, 3])
 
 
 def _mesh(solid: Manifold) -> Mesh:
@@ -153,8 +148,8 @@ def plain_wall(style: Style) -> tuple[Picture, tuple[float, float]]:
 def _piece(style: Style, face: StyleFace) -> Piece:
     picture = style.pictures[face.texture]
     size = abs(face.end - face.start), face.top - face.bottom
-    columns = _longest(_rule(style.sheet, face.vertical), size[0], windows=False)
-    rows = _longest(_rule(style.sheet, face.horizontal), size[1], windows=True)
+    columns = _longest(group_rule(style.sheet, face.vertical), size[0], windows=False)
+    rows = _longest(group_rule(style.sheet, face.horizontal), size[1], windows=True)
     (left, right), (upper, lower) = (
         (int(low / total * pixels), max(int(low / total * pixels) + 1, int(high / total * pixels)))
         for (low, high), total, pixels in (
@@ -168,12 +163,6 @@ def _piece(style: Style, face: StyleFace) -> Piece:
         size[1] * part.shape[0] / picture.shape[0],
     )
     return part, metres
-
-
-def _rule(sheet: StyleSheet, group: str) -> SplitRule:
-    wanted = next(g.rule for g in sheet.groups if g.id == group)
-    rule = next(r for r in sheet.rules if r.id == wanted)
-    return SplitRule(rule.a, rule.b)
 
 
 def _longest(rule: SplitRule, size: float, windows: bool) -> tuple[float, float]:

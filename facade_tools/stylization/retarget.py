@@ -52,7 +52,7 @@ def retarget(style: Style, target: Blocks, small: float = SMALL) -> Scene:
         "roof": Material("roof", "#ffffff", texture=encoded_page(style.pictures[style.sheet.roof])),
         "mass": Material("mass", _mean_colour(style, found)),
     }
-    whole = [_framed(mesh, target) for mesh in [body, *meshes, *tops] if len(mesh.faces)]
+    whole = [framed(mesh, target.frame) for mesh in [body, *meshes, *tops] if len(mesh.faces)]
     return Scene(target.id, tuple(whole), materials)
 
 
@@ -193,8 +193,9 @@ def _roof_uv(style: Style, placed: Placed, points: Floats) -> Floats:
     return uv
 
 
-def _framed(mesh: Mesh, target: Blocks) -> Mesh:
-    if target.frame is None:
+def framed(mesh: Mesh, frame: Sequence[Sequence[float]] | None) -> Mesh:
+    """Return a mesh moved by a rigid motion (4, 4); as it is without one."""
+    if frame is None:
         return mesh
-    frame = np.array(target.frame)
-    return replace(mesh, vertices=mesh.vertices @ frame[:3, :3].T + frame[:3, 3])
+    turn = np.array(frame)
+    return replace(mesh, vertices=mesh.vertices @ turn[:3, :3].T + turn[:3, 3])

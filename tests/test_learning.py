@@ -128,7 +128,7 @@ def test_gaussian_marginal_is_the_chain_of_predictives(centred):
         a, b = x[:i], u[:i]
         after = b.T @ b + precision
         coef = np.linalg.solve(after, b.T @ a + precision @ mean.T).T
-        scatter = em.wishart_scale(d, prior, pooled) + a.T @ a - coef @ after @ coef.T
+        scatter = np.diag(em.wishart_scale(d, prior, pooled)) + a.T @ a - coef @ after @ coef.T
         scatter = scatter + mean @ precision @ mean.T
         freedom = d + prior.freedom + i - d + 1
         factor = 1 + u[i] @ np.linalg.solve(after, u[i])

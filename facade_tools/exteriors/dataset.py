@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .coordinates import Bits, Floats, Readings, states_of
 from .layout import GroupLayout, Layout
-from .transforms import forward, inverse
+from .transforms import forward, inverse, slope_at
 
 Masks = NDArray[np.bool_]
 Ints = NDArray[np.int64]
@@ -155,6 +155,6 @@ def floors(mean: Floats, group: GroupLayout, scaling: Scaling) -> Floats:
     t = mean * scaling.scale + scaling.center
     out = np.empty(mean.shape)
     for i, coordinate in enumerate(group.coordinates):
-        _, slope = forward(coordinate.transform, inverse(coordinate.transform, t[:, i]))
-        out[:, i] = coordinate.floor * np.exp(np.minimum(slope, 12.0)) / scaling.scale[i]
+        slope = np.minimum(slope_at(coordinate.transform, t[:, i]), 12.0)
+        out[:, i] = coordinate.floor * np.exp(slope) / scaling.scale[i]
     return out

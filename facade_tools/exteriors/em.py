@@ -12,8 +12,16 @@ import numpy as np
 
 from .coordinates import Floats
 from .dataset import Dataset, GroupData, floors
-from .kernels import moments
-from .network import Family, Network, Pooled, Posterior, Weights, infer, inputs_of, log_
+from .kernels import Ints, moments
+from .kernels_conjugate import (
+    clipped,
+    fitted_tables,
+    log_normal_wishart,
+    log_total,
+    regressed,
+    state_counts,
+)
+from .network import Family, Network, Pooled, Posterior, Weights, infer, inputs_of
 
 NOTHING = 1e-9
 
@@ -61,7 +69,9 @@ class Statistics:
 
 def prior_precision(width: int, prior: Prior) -> Floats:
     """Return the diagonal of the prior precision of (intercept, slopes)."""
-    return np.concatenate([[prior.mean], np.full(width - 1, prior.slope)])
+    precision = np.full(width, prior.slope)
+    precision[0] = prior.mean
+    return precision
 
 
 def fit_gaussian(
@@ -72,21 +82,17 @@ def fit_gaussian(
     floor (K, d): no direction gets a smaller standard deviation, measured against it.
     """
     _, coef, scatter = posterior_moments(stats, prior, pooled)
-    total = stats.uu[:, 0, 0][:, None, None] + _power(stats.uu.shape[1], prior)
-    return coef, clip(scatter, total, floor)
+    return coef, clipped(scatter, stats.uu[:, 0, 0] + _power(stats.uu.shape[1], prior), floor)
 
 
 def posterior_moments(
     stats: Statistics, prior: Prior, pooled: Pooled | None
 ) -> tuple[Floats, Floats, Floats]:
-    """Return posterior precision of u (K, 1+q, 1+q), coef (K, d, 1+q) and scatter (K, d, d)."""
+    """Return log det of u's posterior precision (K,), coef (K, d, 1+q) and scatter (K, d, d)."""
     d, width = stats.xu.shape[1:]
-    precision, mean = np.diag(prior_precision(width, prior)), prior_mean(d, width, pooled)
-    a = stats.uu + precision
-    xu = stats.xu + mean @ precision
-    coef = np.linalg.solve(a, np.swapaxes(xu, 1, 2)).swapaxes(1, 2)
-    scatter = wishart_scale(d, prior, pooled) + stats.xx + mean @ precision @ mean.T
-    return a, np.asarray(coef), scatter - coef @ a @ np.swapaxes(coef, 1, 2)
+    precision, mean = prior_precision(width, prior), prior_mean(d, width, pooled)
+    scale = wishart_scale(d, prior, pooled)
+    return regressed(stats.uu, stats.xu, stats.xx, mean, precision, scale)
 
 
 def prior_mean(d: int, width: int, pooled: Pooled | None) -> Floats:
@@ -100,25 +106,20 @@ def _power(width: int, prior: Prior) -> float:
 
 
 def wishart_scale(d: int, prior: Prior, pooled: Pooled | None = None) -> Floats:
-    """Return the scale of the inverse Wishart prior, (d, d)."""
+    """Return the diagonal of the scale of the inverse Wishart prior, (d,)."""
     spread = np.ones(d) if pooled is None else pooled.spread
-    return np.diag(spread * prior.spread * (d + prior.freedom))
-
-
-def clip(scatter: Floats, total: Floats, floor: Floats) -> Floats:
-    """Return scatter / total, no direction below the floor (K, d)."""
-    scaled = scatter / total / floor[:, :, None] / floor[:, None, :]
-    scaled = (scaled + np.swapaxes(scaled, 1, 2)) / 2
-    values, vectors = np.linalg.eigh(scaled)
-    if values.size and values.min() < 1.0:
-        scaled = (vectors * np.maximum(values, 1.0)[:, None, :]) @ np.swapaxes(vectors, 1, 2)
-    return np.asarray(scaled * floor[:, :, None] * floor[:, None, :])
+    return np.asarray(spread * prior.spread * (d + prior.freedom))
 
 
 def fit_table(counts: Floats, strength: float) -> Floats:
     """Return MAP probabilities (rows) under a Dirichlet of `strength` pseudo-counts a row."""
-    full = counts + strength / counts.shape[-1]
-    return np.asarray(full / full.sum(axis=-1, keepdims=True))
+    rows = np.ascontiguousarray(counts).reshape(-1, counts.shape[-1])
+    return fitted_tables(rows, whole(counts.shape[-1]), strength).reshape(counts.shape)
+
+
+def whole(width: int) -> Ints:
+    """Return where the tables of `kernels_conjugate` start when there is one of this width."""
+    return np.array([0, width])
 
 
 def statistics(
@@ -131,8 +132,7 @@ def statistics(
         data.x, z, data.order, data.starts, data.masks, family.coef, family.cov, weight
     )
     tables = tuple(
-        np.stack([weight[data.states[:, c] == s].sum(axis=0) for s in range(t.shape[1])], axis=1)
-        for c, t in enumerate(family.tables)
+        state_counts(data.states, c, weight, t.shape[1]) for c, t in enumerate(family.tables)
     )
     return Statistics(uu, xu, xx, tables, hidden)
 
@@ -170,19 +170,16 @@ def log_prior(network: Network, prior: Prior) -> float:
 
 def _log_dirichlet(p: Floats, strength: float) -> float:
     """Pseudo-counts c a state are the density Π p^c (the Dirichlet with parameters 1 + c)."""
-    return float(strength / p.shape[-1] * log_(p).sum())
+    return float(strength / p.shape[-1] * log_total(p.reshape(-1, p.shape[-1])))
 
 
 def _log_normal_wishart(family: Family, prior: Prior) -> float:
     d, width = family.coef.shape[1:]
     if d == 0:
         return 0.0
-    precision = np.diag(prior_precision(width, prior))
-    off = family.coef - prior_mean(d, width, family.pooled)
-    scatter = wishart_scale(d, prior, family.pooled) + off @ precision @ off.swapaxes(1, 2)
-    logdet = np.linalg.slogdet(family.cov)[1]
-    trace = np.trace(np.linalg.solve(family.cov, scatter), axis1=1, axis2=2)
-    return float(-0.5 * (_power(width, prior) * logdet + trace).sum())
+    precision, mean = prior_precision(width, prior), prior_mean(d, width, family.pooled)
+    scale, power = wishart_scale(d, prior, family.pooled), _power(width, prior)
+    return log_normal_wishart(family.coef, family.cov, mean, precision, scale, power)
 
 
 # --- the loop -----------------------------------------------------------------------------------

@@ -20,6 +20,7 @@ Masks = NDArray[np.bool_]
 
 LOG_2PI = log(2.0 * pi)
 NEGLIGIBLE = 1e-9  # a responsibility below it adds nothing
+LEAST_PROBABILITY = 1e-300
 
 
 @compiled
@@ -122,9 +123,6 @@ def fill_mean(
     v is overwritten by cov_oo⁻¹ v.
     """
     d = mask.shape[0]
-    if size == d:
-        out[:] = v
-        return
     for a in range(size):
         out[index[a]] = v[a]
     solve_lower(factor, size, v)
@@ -142,8 +140,6 @@ def spread(cov: Floats, factor: Floats, mask: Masks, index: Ints, size: int, out
     """Write the covariance of the unobserved coordinates given the observed ones to `out`."""
     d = mask.shape[0]
     out[:] = 0.0
-    if size == d:
-        return
     half = np.empty((d, size))
     for i in range(d):
         if not mask[i]:
@@ -157,6 +153,14 @@ def spread(cov: Floats, factor: Floats, mask: Masks, index: Ints, size: int, out
                 for a in range(size):
                     total -= half[i, a] * half[j, a]
                 out[i, j] = total
+
+
+@compiled
+def mirror(a: Floats) -> None:
+    """Copy the lower triangle to the upper one."""
+    for i in range(len(a)):
+        for j in range(i):
+            a[j, i] = a[i, j]
 
 
 @compiled
@@ -193,8 +197,9 @@ def moments(  # noqa: C901 - one pass over the rows, compiled
             for a in range(size):
                 for b in range(size):
                     factor[a, b] = cov[k, index[a], index[b]]
-            cholesky(factor, size)
-            spread(cov[k], factor, masks[p], index, size, extra)
+            if size < d:
+                cholesky(factor, size)
+                spread(cov[k], factor, masks[p], index, size, extra)
             mass = 0.0
             for r in range(starts[p], starts[p + 1]):
                 n = order[r]
@@ -204,19 +209,72 @@ def moments(  # noqa: C901 - one pass over the rows, compiled
                 mass += w
                 for q in range(1, width):
                     u[q] = z[n, q - 1]
-                residual(coef[k], z[n], x[n], index, size, v)
-                fill_mean(cov[k], factor, masks[p], index, size, v, full)
-                for i in range(d):
-                    for q in range(width):
-                        full[i] += coef[k, i, q] * u[q]
+                if size == d:
+                    full[:] = x[n]
+                else:
+                    residual(coef[k], z[n], x[n], index, size, v)
+                    fill_mean(cov[k], factor, masks[p], index, size, v, full)
+                    for i in range(d):
+                        for q in range(width):
+                            full[i] += coef[k, i, q] * u[q]
                 for q in range(width):
-                    for m in range(width):
+                    for m in range(q + 1):
                         uu[k, q, m] += w * u[q] * u[m]
                 for i in range(d):
                     for q in range(width):
                         xu[k, i, q] += w * full[i] * u[q]
-                    for j in range(d):
+                    for j in range(i + 1):
                         xx[k, i, j] += w * full[i] * full[j]
             if size < d:
                 xx[k] += mass * extra
+    for k in range(clusters):
+        mirror(uu[k])
+        mirror(xx[k])
     return uu, xu, xx
+
+
+# --- between S and the hidden variables --------------------------------------------------------
+
+
+@compiled
+def message(local: Floats, hidden: Floats) -> tuple[Floats, Floats, Floats]:
+    """Sum the hidden variable out of local log densities (n, K) under P(H | S) (|S|, K).
+
+    Returned: likelihood (n, K), scaled to 1 at the top; its share (n, |S|) under each style; the
+    log density of the group given S (n, |S|).
+    """
+    rows, clusters = local.shape
+    likelihood = np.empty((rows, clusters))
+    mass = np.zeros((rows, hidden.shape[0]))
+    upwards = np.empty((rows, hidden.shape[0]))
+    wide = hidden.T.copy()
+    for n in range(rows):
+        top = local[n].max()
+        for k in range(clusters):
+            likelihood[n, k] = np.exp(local[n, k] - top)
+            for s in range(hidden.shape[0]):
+                mass[n, s] += wide[k, s] * likelihood[n, k]
+        for s in range(hidden.shape[0]):
+            mass[n, s] = max(mass[n, s], LEAST_PROBABILITY)
+            upwards[n, s] = np.log(mass[n, s]) + top
+    return likelihood, mass, upwards
+
+
+@compiled
+def downward(
+    likelihood: Floats, mass: Floats, hidden: Floats, style: Floats, weight: Floats
+) -> tuple[Floats, Floats]:
+    """Return P(H | row) (n, K) and Σ weight · P(S, H | row) (|S|, K) from P(S | row) (n, |S|)."""
+    rows, clusters = likelihood.shape
+    out, joint = np.empty((rows, clusters)), np.zeros(hidden.shape)
+    share = np.empty(clusters)
+    for n in range(rows):
+        share[:] = 0.0
+        for s in range(hidden.shape[0]):
+            part = style[n, s] / mass[n, s]
+            for k in range(clusters):
+                share[k] += part * hidden[s, k]
+                joint[s, k] += part * weight[n] * likelihood[n, k]
+        for k in range(clusters):
+            out[n, k] = likelihood[n, k] * share[k]
+    return out, joint * hidden

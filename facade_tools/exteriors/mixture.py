@@ -13,9 +13,11 @@ import numpy as np
 from .coordinates import Floats
 from .dataset import Dataset, Scaling, floors
 from .em import NOTHING, Prior, maximise, statistics
+from .kernels_conjugate import clear_regression
 from .layout import GroupLayout
 from .network import Family, Pooled, empty_family, inputs_of, local_log_density, log_, log_sum
 from .score import log_marginal, pooled_cost
+from .styles import longest
 
 CANDIDATES = 3  # clusters that are tried for a split
 TRIAL = 4  # iterations of each trial
@@ -105,23 +107,8 @@ def regression(task: Task, inputs: tuple[int, ...]) -> Pooled | None:
         return None
     data = task.data.groups[task.group]
     u = np.column_stack([np.ones(len(data.x)), task.data.features[:, inputs]])
-    d, width = data.x.shape[1], u.shape[1]
-    coef, spread = np.zeros((d, width)), np.ones(d)
-    for i in range(d):
-        weight = task.weight * data.dense[:, i]
-        coef[i], spread[i], t = _least_squares(u, data.x[:, i], weight)
-        clear = np.flatnonzero((np.abs(t) >= CLEAR) | (np.arange(width) == 0))
-        coef[i] = 0.0
-        coef[i, clear], spread[i], _ = _least_squares(u[:, clear], data.x[:, i], weight)
-    return Pooled(coef, spread)
-
-
-def _least_squares(u: Floats, x: Floats, weight: Floats) -> tuple[Floats, float, Floats]:
-    """Return coefficients, variance left over, t values; with one row of no effect (ridge)."""
-    a = (u * weight[:, None]).T @ u + np.eye(u.shape[1])
-    coef = np.asarray(np.linalg.solve(a, u.T @ (weight * x)))
-    left = float((weight @ (x - u @ coef) ** 2 + 1.0) / (weight.sum() + 1.0))
-    return coef, left, np.asarray(coef / np.sqrt(left * np.diag(np.linalg.inv(a))))
+    weight = task.weight[:, None] * data.dense
+    return Pooled(*clear_regression(data.x, u, weight, CLEAR))
 
 
 def completed(task: Task, family: Family, clusters: Floats, inputs: tuple[int, ...]) -> float:
@@ -181,8 +168,7 @@ def split(task: Task, family: Family, clusters: Floats, k: int) -> Floats:
     w = clusters[:, k] * task.weight
     mean = w @ shown / max(float(w.sum()), NOTHING)
     centred = shown - mean
-    _, vectors = np.linalg.eigh((centred * w[:, None]).T @ centred)
-    side = centred @ vectors[:, -1] > 0
+    side = centred @ longest(centred, w) > 0
     first, second = clusters[:, k] * side, clusters[:, k] * ~side
     blend = 0.1 * clusters[:, k]  # both halves keep a little of everything
     out = np.delete(clusters, k, axis=1)

@@ -8,10 +8,9 @@ import numpy as np
 
 from .coordinates import Bits, Floats
 from .dataset import Dataset, GroupData, Scaling
-from .kernels import gaussian
+from .kernels import LEAST_PROBABILITY, downward, gaussian, message
+from .kernels_conjugate import add_states
 from .layout import GroupLayout, Layout
-
-LEAST_PROBABILITY = 1e-300
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,13 +89,14 @@ def local_log_density(family: Family, data: GroupData, features: Floats) -> Floa
     out = gaussian(data.x, inputs_of(family, features), data.order, data.starts, data.masks,
                    family.coef, family.cov)  # fmt: skip
     for c, table in enumerate(family.tables):
-        padded = np.concatenate([log_(table), np.zeros((len(table), 1))], axis=1)
-        out += padded.T[data.states[:, c]]  # state −1 takes the last column: unknown
+        add_states(out, data.states, c, np.ascontiguousarray(table))
     return out
 
 
 def inputs_of(family: Family, features: Floats) -> Floats:
     """Return the features that the group's lateral parents show, (n, inputs)."""
+    if not family.inputs:
+        return np.empty((len(features), 0))
     return np.ascontiguousarray(features[:, family.inputs])
 
 
@@ -114,12 +114,25 @@ def log_sum(a: Floats) -> Floats:
     return total
 
 
-def marginal(family: Family, local: Floats) -> Floats:
-    """Return log P(group | S) (n, |S|): the hidden variable summed out."""
+@dataclass(frozen=True, slots=True)
+class Message:
+    """What a group says upwards: log P(group | S) (n, |S|).
+
+    likelihood (n, K): P(group | H), scaled to 1 at each row's top; mass (n, |S|): its sum under
+    P(H | S). Of a group that hangs on S itself both are empty.
+    """
+
+    upwards: Floats
+    likelihood: Floats
+    mass: Floats
+
+
+def message_of(family: Family, local: Floats) -> Message:
+    """Return the message of log densities (n, K): the hidden variable summed out."""
     if family.direct:
-        return local
-    top = local.max(axis=1, keepdims=True)
-    return np.asarray(log_(np.exp(local - top) @ family.hidden.T) + top)
+        return Message(local, local[:, :0], local[:, :0])
+    likelihood, mass, upwards = message(local, family.hidden)
+    return Message(upwards, likelihood, mass)
 
 
 def infer(network: Network, data: Dataset, weights: Weights | None = None) -> Posterior:
@@ -128,50 +141,41 @@ def infer(network: Network, data: Dataset, weights: Weights | None = None) -> Po
     weights: of the rows in `joint`; 1 without. Lateral parents must be known where their children
     are observed (`density.log_density` treats other rows).
     """
-    local, messages, joint = _upwards(network, data)
+    messages, joint = _upwards(network, data)
     log_density = log_sum(joint)
     style = np.exp(joint - log_density[:, None])
-    rows = weights.groups if weights else [None] * len(local)
+    rows = weights.groups if weights else [np.ones(len(style))] * len(messages)
     pairs = [
-        _clusters(family, table, message, style, weight)
-        for family, table, message, weight in zip(
-            network.families, local, messages, rows, strict=True
-        )
+        _clusters(family, said, style, weight)
+        for family, said, weight in zip(network.families, messages, rows, strict=True)
     ]
     return Posterior(log_density, style, tuple(p[0] for p in pairs), tuple(p[1] for p in pairs))
 
 
 def row_log_density(network: Network, data: Dataset) -> Floats:
     """Return what `infer` finds for `log_density` (n,), without the posteriors."""
-    return log_sum(_upwards(network, data)[2])
+    return log_sum(_upwards(network, data)[1])
 
 
-def _upwards(network: Network, data: Dataset) -> tuple[list[Floats], list[Floats], Floats]:
-    """Return log P(group | H) and log P(group | S) of all groups, and log P(row, S) (n, |S|)."""
-    local = [
-        local_log_density(family, group, data.features)
+def _upwards(network: Network, data: Dataset) -> tuple[list[Message], Floats]:
+    """Return the messages of all groups, and log P(row, S) (n, |S|)."""
+    messages = [
+        message_of(family, local_log_density(family, group, data.features))
         for family, group in zip(network.families, data.groups, strict=True)
     ]
-    messages = [marginal(f, table) for f, table in zip(network.families, local, strict=True)]
     joint = bit_log_density(network.bits, data.bits) + log_(network.style)
-    for message in messages:
-        joint = joint + message
-    return local, messages, joint
+    for said in messages:
+        joint = joint + said.upwards
+    return messages, joint
 
 
 def _clusters(
-    family: Family, local: Floats, message: Floats, style: Floats, weight: Floats | None
+    family: Family, said: Message, style: Floats, weight: Floats
 ) -> tuple[Floats, Floats]:
     """Return P(H | row) (n, K) and Σ P(S, H | row) (|S|, K)."""
-    weight = np.ones(len(style)) if weight is None else weight
     if family.direct:
         return style, np.diag(weight @ style)
-    top = local.max(axis=1, keepdims=True)
-    likelihood = np.exp(local - top)
-    share = style * np.exp(np.minimum(top - message, 700.0))
-    clusters = likelihood * (share @ family.hidden)
-    joint = family.hidden * ((share * weight[:, None]).T @ likelihood)
-    return clusters, joint
+    return downward(said.likelihood, said.mass, family.hidden, style, weight)
 
 
 def topological(families: tuple[Family, ...], layout: Layout) -> list[int]:

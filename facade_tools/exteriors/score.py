@@ -7,14 +7,20 @@ network adds its own `marginal − complete`; only log P(O|G, Θ) needs them all
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import gammaln, multigammaln
 
 from .coordinates import Floats
 from .dataset import Dataset
-from .em import Prior, Statistics, posterior_moments, prior_precision, statistics, wishart_scale
-from .network import Family, Network, Pooled, Posterior, Weights, log_
-
-LOG_2PI = float(np.log(2 * np.pi))
+from .em import (
+    Prior,
+    Statistics,
+    posterior_moments,
+    prior_precision,
+    statistics,
+    whole,
+    wishart_scale,
+)
+from .kernels_conjugate import dirichlet_part, log_completes, log_marginals
+from .network import Family, Network, Pooled, Posterior, Weights
 
 
 def table_part(counts: Floats, p: Floats, strength: float) -> float:
@@ -22,12 +28,9 @@ def table_part(counts: Floats, p: Floats, strength: float) -> float:
 
     The marginal is under Dirichlet(1 + strength/m), whose mode `em.fit_table` takes.
     """
-    alpha = 1.0 + strength / counts.shape[-1]
     m = counts.shape[-1]
-    total = counts.sum(axis=-1)
-    marginal = gammaln(m * alpha) - gammaln(m * alpha + total)
-    marginal = marginal + (gammaln(alpha + counts) - gammaln(alpha)).sum(axis=-1)
-    return float(np.sum(marginal) - np.sum(counts * log_(p)))
+    rows = np.ascontiguousarray(counts).reshape(-1, m)
+    return dirichlet_part(rows, np.ascontiguousarray(p).reshape(-1, m), whole(m), strength)
 
 
 def gaussian_part(stats: Statistics, family: Family, prior: Prior) -> float:
@@ -49,34 +52,15 @@ def pooled_cost(stats: Statistics, pooled: Pooled | None) -> float:
 def log_marginal(stats: Statistics, prior: Prior, pooled: Pooled | None = None) -> Floats:
     """Return the log marginal likelihood (K,) under the matrix-normal inverse-Wishart prior."""
     d, width = stats.xu.shape[1:]
-    rows = stats.uu[:, 0, 0]
-    precision = np.diag(prior_precision(width, prior))
     after, _, scatter = posterior_moments(stats, prior, pooled)
-    scale = wishart_scale(d, prior, pooled)
-    freedom = d + prior.freedom
-    return np.asarray(
-        -0.5 * rows * d * np.log(np.pi)
-        + 0.5 * d * (_logdet(precision) - _logdet(after))
-        + 0.5 * freedom * _logdet(scale)
-        - 0.5 * (freedom + rows) * _logdet(scatter)
-        + multigammaln((freedom + rows) / 2, d)
-        - multigammaln(freedom / 2, d)
-    )
+    precision, scale = prior_precision(width, prior), wishart_scale(d, prior, pooled)
+    rows = np.ascontiguousarray(stats.uu[:, 0, 0])
+    return log_marginals(rows, after, scatter, precision, scale, d + prior.freedom)
 
 
 def log_complete(stats: Statistics, family: Family) -> Floats:
     """Return the expected complete log likelihood (K,) of the moments."""
-    d = stats.xu.shape[1]
-    rows = stats.uu[:, 0, 0]
-    cross = family.coef @ stats.xu.swapaxes(1, 2)
-    scatter = stats.xx - cross - cross.swapaxes(1, 2)
-    scatter = scatter + family.coef @ stats.uu @ family.coef.swapaxes(1, 2)
-    trace = np.trace(np.linalg.solve(family.cov, scatter), axis1=1, axis2=2)
-    return np.asarray(-0.5 * (rows * (d * LOG_2PI + _logdet(family.cov)) + trace))
-
-
-def _logdet(a: Floats) -> Floats:
-    return np.asarray(np.linalg.slogdet(a)[1])
+    return log_completes(stats.uu, stats.xu, stats.xx, family.coef, family.cov)
 
 
 def family_part(stats: Statistics, family: Family, prior: Prior) -> float:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import eigh
 
 from ..compiled import compiled
 from .coordinates import Bits, Floats
 from .dataset import Dataset
 from .em import NOTHING, Prior, fit_table
+from .kernels_conjugate import fitted_tables
 from .network import Weights
 
 Ints = NDArray[np.int64]
@@ -41,28 +42,33 @@ def upper_pass(  # noqa: C901 - one pass over the rows, compiled: calls would co
     (n, |S|), counts (|S|, ΣK): Σ weight · P(S, H | row).
     """
     n_styles, groups = style.shape[0], starts.shape[0] - 1
-    sums = np.empty((n_styles, groups))
-    logs = np.empty(n_styles)
-    counts[:] = 0.0
+    sums = np.empty((groups, n_styles))
+    logs, product = np.empty(n_styles), np.empty(n_styles)
+    wide, ones, zeros = hidden.T.copy(), one.T.copy(), 1.0 - one.T  # styles side by side: SIMD
+    total = np.zeros(wide.shape)
     for n in range(likelihood.shape[0]):
+        product[:] = style
+        logs[:] = 0.0
+        for b in range(bits.shape[1]):
+            if bits[n, b] >= 0:
+                table = ones[b] if bits[n, b] == 1 else zeros[b]
+                for s in range(n_styles):
+                    product[s] *= table[s]
+        for g in range(groups):
+            mass = sums[g]
+            mass[:] = 1e-290
+            for k in range(starts[g], starts[g + 1]):
+                likely, table = likelihood[n, k], wide[k]
+                for s in range(n_styles):
+                    mass[s] += table[s] * likely
+            for s in range(n_styles):
+                if product[s] < SMALL:
+                    logs[s] += np.log(product[s])
+                    product[s] = 1.0
+                product[s] *= mass[s]
         top = -np.inf
         for s in range(n_styles):
-            product, total = style[s], 0.0
-            for b in range(bits.shape[1]):
-                if bits[n, b] == 1:
-                    product *= one[s, b]
-                elif bits[n, b] == 0:
-                    product *= 1.0 - one[s, b]
-            for g in range(groups):
-                mass = 1e-290
-                for k in range(starts[g], starts[g + 1]):
-                    mass += hidden[s, k] * likelihood[n, k]
-                sums[s, g] = mass
-                if product < SMALL:
-                    total += np.log(product)
-                    product = 1.0
-                product *= mass
-            logs[s] = total + np.log(product)
+            logs[s] += np.log(product[s])
             top = max(top, logs[s])
         norm = 0.0
         for s in range(n_styles):
@@ -71,11 +77,15 @@ def upper_pass(  # noqa: C901 - one pass over the rows, compiled: calls would co
         density[n] = top + np.log(norm)
         for s in range(n_styles):
             posterior[n, s] /= norm
-            if posterior[n, s] > 1e-8:
-                for g in range(groups):
-                    share = posterior[n, s] * weight[n, g] / sums[s, g]
-                    for k in range(starts[g], starts[g + 1]):
-                        counts[s, k] += share * hidden[s, k] * likelihood[n, k]
+        for g in range(groups):
+            mass, w = sums[g], weight[n, g]
+            for s in range(n_styles):
+                product[s] = w * posterior[n, s] / mass[s]
+            for k in range(starts[g], starts[g + 1]):
+                likely, table = likelihood[n, k], total[k]
+                for s in range(n_styles):
+                    table[s] += product[s] * likely
+    counts[:] = (total * wide).T
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,8 +160,7 @@ def expect(rows: Rows, shown: Evidence, style: Floats, bits: Floats, hidden: Flo
 
 def normalised(counts: Floats, starts: Ints, strength: float) -> Floats:
     """Return MAP tables of side-by-side counts: each group's columns sum to 1."""
-    parts = [fit_table(counts[:, a:b], strength) for a, b in pairwise(starts)]
-    return np.ascontiguousarray(np.concatenate(parts, axis=1))
+    return fitted_tables(counts, starts, strength)
 
 
 def bit_counts(rows: Rows, posterior: Floats) -> tuple[Floats, Floats]:
@@ -214,7 +223,17 @@ def cut(posterior: Floats, look: Floats, weight: Floats, k: int) -> Floats:
     """Return the posterior with style k cut across the direction in which its rows differ most."""
     w = posterior[:, k] * weight
     centred = look - w @ look / max(float(w.sum()), NOTHING)
-    _, vectors = np.linalg.eigh((centred * w[:, None]).T @ centred)
-    side = centred @ vectors[:, -1] > 0
+    side = centred @ longest(centred, w) > 0
     halves = [posterior[:, k] * (0.8 * side + 0.1), posterior[:, k] * (0.8 * ~side + 0.1)]
     return np.concatenate([np.delete(posterior, k, axis=1), np.stack(halves, axis=1)], axis=1)
+
+
+def longest(centred: Floats, weight: Floats) -> Floats:
+    """Return the direction (m,) in which centred rows (n, m) differ most.
+
+    Its greatest entry is positive: which of ± comes out of LAPACK differs between machines.
+    """
+    last = centred.shape[1] - 1
+    _, vectors = eigh((centred * weight[:, None]).T @ centred, subset_by_index=[last, last])
+    direction = vectors[:, 0]
+    return np.asarray(direction * np.sign(direction[np.argmax(np.abs(direction))]))

@@ -18,7 +18,7 @@ STEP = 0.05
 
 
 class Transform(NamedTuple):
-    """forward and inverse map; log |dt/dx|; the interval on which they are defined."""
+    """forward and inverse map; log |dt/dx| as a function of t; the interval of x."""
 
     forward: Callable[[Floats], Floats]
     inverse: Callable[[Floats], Floats]
@@ -37,20 +37,20 @@ def _exp(t: Floats) -> Floats:
 
 TRANSFORMS: dict[str, Transform] = {
     "identity": Transform(
-        lambda x: x.copy(), lambda t: t.copy(), lambda x: np.zeros_like(x), -LARGEST, LARGEST
+        lambda x: np.array(x), lambda t: t.copy(), lambda t: np.zeros_like(t), -LARGEST, LARGEST
     ),
-    "log": Transform(np.log, _exp, lambda x: -np.log(x), EDGE, LARGEST),
+    "log": Transform(np.log, _exp, np.negative, EDGE, LARGEST),
     "logit": Transform(
         lambda x: np.log(x / (1.0 - x)),
         _logistic,
-        lambda x: -np.log(x * (1.0 - x)),
+        lambda t: np.abs(t) + 2.0 * np.log1p(np.exp(-np.abs(t))),
         EDGE,
         1.0 - EDGE,
     ),
     "log-above-1": Transform(
         lambda x: np.log(x - 1.0 + STEP),
         lambda t: 1.0 - STEP + _exp(t),
-        lambda x: -np.log(x - 1.0 + STEP),
+        np.negative,
         1.0 + EDGE,
         LARGEST,
     ),
@@ -66,7 +66,15 @@ def forward(name: str, x: Floats) -> tuple[Floats, Floats]:
     """
     transform = TRANSFORMS[name]
     inside = np.clip(x, transform.lowest, transform.highest)
-    return transform.forward(inside), transform.log_slope(inside)
+    t = transform.forward(inside)
+    return t, transform.log_slope(t)
+
+
+def slope_at(name: str, t: Floats) -> Floats:
+    """Return log |dt/dx| at points of the unbounded scale; at the nearest end where outside."""
+    transform = TRANSFORMS[name]
+    lowest, highest = (transform.forward(np.array(x)) for x in transform[3:])
+    return transform.log_slope(np.clip(t, lowest, highest))
 
 
 def inverse(name: str, t: Floats) -> Floats:

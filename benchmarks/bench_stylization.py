@@ -6,11 +6,11 @@ Per model: blocks, faces, share of the surface that is no Manhattan building's, 
 area of the remesh over those of the model's own sections (polygons of shapely at 60 heights;
 courts count as filled on both sides), mean SSIM of four orthographic facade renders of the
 self-retarget against the source (160×160 pixels, 4×4 rays each, both blurred by one pixel, 8×8
-windows), period of the front's columns by autocorrelation (m): of the source, of the copy, of the
-copy 1.5 times as wide in pixels of the same size (each time the peak nearest to the source's), the
-widths of windows there,
-and seconds of processor time. `--pictures` draws source, copy, 1.5 times as wide and 1.6 times as
-high.
+windows), period of the front by autocorrelation (m): of the source the first, of the copy, and of
+the copy 1.5 times as wide in pixels of the same size, the one nearest to the source's; a pixel (m);
+of the rules at 1.5 and 2 times their size: how far windows' widths are off, the share of faces that
+have as many windows as eq. 8 packs, and as many give or take one; seconds of processor time.
+`--pictures` draws source, copy, 1.5 times as wide and 1.6 times as high.
 """
 
 from __future__ import annotations
@@ -18,12 +18,13 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 import shapely
+from periods import period
 
 from facade_tools.errors import FacadeError
 from facade_tools.formats.mesh_reader import ENDINGS, read_textured
@@ -31,13 +32,14 @@ from facade_tools.formats.textured import Paint, TexturedMesh, joined
 from facade_tools.geometry.mesh import Material, Mesh, Scene
 from facade_tools.imaging.image_io import decoded, encoded
 from facade_tools.stylization.capture import capture_style
+from facade_tools.stylization.columns import aligned_rules
 from facade_tools.stylization.framing import standard_view
 from facade_tools.stylization.model import CaptureOptions
 from facade_tools.stylization.projection import SIDES, Palette, _rasterise, palette
 from facade_tools.stylization.remesh import section
 from facade_tools.stylization.resizing import resized
 from facade_tools.stylization.retarget import retarget
-from facade_tools.stylization.splitting import SplitRule, split
+from facade_tools.stylization.splitting import packed, split
 from facade_tools.stylization.style import Style
 
 SIZE, RAYS = 160, 4
@@ -50,21 +52,33 @@ def facade_renders(
     size: int = SIZE,
 ) -> list[np.ndarray]:
     """Return orthographic views of sides inside the box (low, high), background white."""
+    return [shrunk(view) for view in rays(mesh, box, sides, size)]
+
+
+def shrunk(view: np.ndarray) -> np.ndarray:
+    """Return a picture whose pixels are the means of their rays."""
+    size = len(view) // RAYS, view.shape[1] // RAYS
+    return cv2.resize(view, size[::-1], interpolation=cv2.INTER_AREA)
+
+
+def rays(
+    mesh: TexturedMesh, box: tuple[np.ndarray, np.ndarray], sides: Sequence[str], size: int
+) -> list[np.ndarray]:
+    """Return what every ray of orthographic views sees, RAYS × RAYS of them a pixel."""
     paints = palette(mesh)
-    return [_render(mesh, paints, side, box, size) for side in sides]
+    return [_seen(mesh, paints, side, box, size * RAYS) for side in sides]
 
 
-def _render(
+def _seen(
     mesh: TexturedMesh,
     paints: Palette,
     side: str,
     box: tuple[np.ndarray, np.ndarray],
-    size: int,
+    count: int,
 ) -> np.ndarray:
     low, high = box
     along, direction, depth, sign = SIDES[side]
-    side_pixels = size * RAYS
-    scale = side_pixels / max(high[along] - low[along], high[2] - low[2])
+    scale = count / max(high[along] - low[along], high[2] - low[2])
     corners = mesh.vertices[mesh.faces]
     start = low[along] if direction > 0 else -high[along]
     far = high[depth] if sign > 0 else -low[depth]
@@ -76,11 +90,11 @@ def _render(
         ],
         axis=-1,
     )
-    picture = np.full((side_pixels, side_pixels, 3), 255, dtype=np.uint8)
-    nearest = np.full((side_pixels, side_pixels), 1e9)
+    picture = np.full((count, count, 3), 255, dtype=np.uint8)
+    nearest = np.full((count, count), 1e9)
     uv = np.where(np.isfinite(mesh.uv), mesh.uv, 0.0)
     _rasterise(view, uv, mesh.paint, paints.pixels, paints.table, picture, nearest)
-    return cv2.resize(picture, (size, size), interpolation=cv2.INTER_AREA)
+    return picture
 
 
 def grey(picture: np.ndarray) -> np.ndarray:
@@ -110,31 +124,6 @@ def _part(mesh: Mesh, material: Material) -> TexturedMesh:
     picture = decoded(material.texture, material.name) if material.texture else None
     paints = (Paint(material.name, color, picture),)
     return TexturedMesh(mesh.vertices, mesh.faces, uv, np.zeros(count, dtype=np.int64), paints)
-
-
-def peaks(render: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the peaks of the autocorrelation of the columns' mean: lags (pixels) and power."""
-    signal = render.mean(axis=0)
-    signal = signal[signal < 0.999]
-    n = len(signal)
-    signal = signal - cv2.blur(signal.reshape(1, -1), (31, 1)).ravel() if n else signal
-    if n < 16 or signal.std() < 1e-4:
-        return np.empty(0), np.empty(0)
-    power = np.correlate(signal, signal, "full")[n - 1 :] / (n - np.arange(n))
-    lags = [k for k in range(3, n // 2) if power[k] > power[k - 1] and power[k] >= power[k + 1]]
-    lags = [k for k in lags if power[k] > 0]
-    return np.array(lags), power[lags]
-
-
-def period(render: np.ndarray, metres: float, near: float | None = None) -> float:
-    """Return the first strong peak, or the peak nearest to `near` (m); nan without any."""
-    lags, power = peaks(render)
-    if not len(lags):
-        return float("nan")
-    if near is None or np.isnan(near):
-        return float(lags[power > 0.5 * power.max()][0] * metres)
-    known = lags[power > 0.25 * power.max()] * metres
-    return float(known[np.argmin(np.abs(known - near))]) if len(known) else float("nan")
 
 
 def outlined(vertices: np.ndarray, faces: np.ndarray) -> tuple[float, float]:
@@ -190,19 +179,33 @@ def largest(box: tuple[np.ndarray, np.ndarray]) -> float:
     return float(max(box[1][0] - box[0][0], box[1][2] - box[0][2]))
 
 
-def counts(style: Style) -> str:
-    """Return how many wide groups have windows, and the worst width at ×1.5 and ×2 (share)."""
-    worst = 0.0
-    groups = {g.id: g.rule for g in style.sheet.groups}
-    rules = {r.id: SplitRule(r.a, r.b) for r in style.sheet.rules}
-    for group in {f.vertical for w in style.sheet.walls for f in w.faces}:
-        rule = rules[groups[group]]
-        for factor in (1.5, 2.0):
+@dataclass(frozen=True)
+class Counts:
+    """Of the rules of a sheet at ×1.5 and ×2.
+
+    width: how far a window's width is off at most, as a share. packed: share of the faces whose
+    number of windows is the one that eq. 8 packs; near: the same or one more or less.
+    """
+
+    width: float
+    packed: float
+    near: float
+
+
+def counts(style: Style) -> Counts:
+    """Return how windows of wide faces are counted and how their widths are kept."""
+    worst, off = 0.0, []
+    rules = aligned_rules(style.sheet, style.blocks)
+    for group in sorted({f.vertical for w in style.sheet.walls for f in w.faces}):
+        rule = rules[group]
+        for factor in (1.5, 2.0) if rule.insertable else ():
             done = split(rule, factor * rule.size)
+            off.append(abs(done.windows - packed(rule, factor * rule.size)))
             for source, size in zip(done.sources, done.sizes, strict=True):
                 if source % 2:
                     worst = max(worst, abs(size / rule.insertable[source // 2] - 1))
-    return f"{worst:5.1%}"
+    differences = np.array(off or [0])
+    return Counts(worst, float((differences == 0).mean()), float((differences <= 1).mean()))
 
 
 def measure(path: Path) -> tuple[str, np.ndarray]:
@@ -224,20 +227,25 @@ def measure(path: Path) -> tuple[str, np.ndarray]:
     likeness = np.mean([ssim(grey(a), grey(b)) for a, b in pairs])
     scale = largest(box) / SIZE
     size = round(largest(bounds(wide)) / scale)  # pixels of the same size as the source's
-    wide_front = facade_renders(wide, bounds(wide), ["front"], size)[0]
-    own = period(grey(pairs[0][0]), scale)
-    periods = own, period(grey(pairs[0][1]), scale, own), period(grey(wide_front), scale, own)
+    fronts = (
+        rays(m, bounds(m), ["front"], pixels)[0]
+        for m, pixels in ((standard.mesh, SIZE), (copy, SIZE), (wide, size))
+    )
+    own, *others = fronts
+    first = period(own, RAYS)
+    periods = [scale * p for p in (first, *(period(view, RAYS, first) for view in others))]
     reference = np.array(outlined(standard.mesh.vertices, standard.mesh.faces))
     kept = np.array(remeshed(style)) / reference
     faces = sum(len(wall.faces) for wall in style.sheet.walls)
+    kinds = counts(style)
     row = (
         f"{path.parent.name[:34]:34} {len(mesh.faces):6} {len(capture.blocks.blocks):3} "
         f"{faces:5} {capture.sheet.lost:5.0%} {kept[0]:6.3f} {kept[1]:6.3f} {likeness:6.3f}  "
         f"{periods[0]:6.2f} {periods[1]:6.2f} {periods[2]:6.2f} {scale:6.2f}  "
-        f"{counts(style)}  "
+        f"{kinds.width:5.1%} {kinds.packed:4.0%} {kinds.near:4.0%}  "
         f"{captured - start:5.2f} {done - captured:5.2f}"
     )
-    small = cv2.resize(wide_front, (SIZE, SIZE), interpolation=cv2.INTER_AREA)
+    small = cv2.resize(shrunk(others[1]), (SIZE, SIZE), interpolation=cv2.INTER_AREA)
     views = [pairs[0][0], pairs[0][1], pairs[1][0], pairs[1][1], small]
     return row, np.hstack([*views, facade_renders(high, bounds(high), ["front"])[0]])
 
@@ -251,8 +259,8 @@ def main() -> None:
     options = parser.parse_args()
     print(
         f"{'model':34} {'tris':>6} {'blk':>3} {'faces':>5} {'lost':>5} {'volume':>6} {'walls':>6} "
-        f"{'SSIM':>6}  {'period':>6} {'copy':>6} {'x1.5':>6} {'column':>6}  {'width':>5}  "
-        f"{'capt':>5} {'retg':>5}"
+        f"{'SSIM':>6}  {'period':>6} {'copy':>6} {'x1.5':>6} {'column':>6}  "
+        f"{'width':>5} {'eq8':>4} {'±1':>4}  {'capt':>5} {'retg':>5}"
     )
     pictures = []
     for folder in sorted(p for p in options.folder.iterdir() if p.is_dir()):

@@ -9,9 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from facade_tools.stylization.splitting import (
+    LEAST_MARGIN,
+    MOST_MARGIN,
     SplitRule,
     insertable_labels,
     merged,
+    packed,
+    repeat,
     rule_of,
     split,
     split_rule,
@@ -98,6 +102,51 @@ def test_a_split_fills_the_face_and_never_stretches_windows(rule, size):
     assert done.windows == sum(source % 2 for source in done.sources)
     assert done.sources[0] % 2 == 0
     assert done.sources[-1] % 2 == 0
+
+
+def pitches(rule, size):
+    """The distances between the middles of neighbouring windows."""
+    done = split(rule, size)
+    ends = np.cumsum([0, *done.sizes])
+    middles = [
+        (a + b) / 2 for k, a, b in zip(done.sources, ends[:-1], ends[1:], strict=True) if k % 2
+    ]
+    return np.diff(middles)
+
+
+@pytest.mark.parametrize("factor", [0.8, 1.25, 1.5, 1.7, 2.0])
+def test_distances_of_windows_stay_whatever_the_width(factor):
+    even = SplitRule((0.6, 1.2, 1.2, 1.2, 1.2, 1.2, 0.6), (1.5,) * 6)
+    assert pitches(even, factor * even.size) == pytest.approx(2.7, rel=0.03)
+    pairs = SplitRule((1.5, 2.2, 3.0, 2.2, 3.0, 2.2, 1.5), (1.0,) * 6)  # two windows over a gate
+    found = pitches(pairs, factor * pairs.size)
+    assert found[::2] == pytest.approx(3.2, rel=0.03)
+    assert found[1::2] == pytest.approx(4.0, rel=0.03)
+
+
+def test_a_rule_that_repeats_within_itself_goes_on():
+    bays = SplitRule((0.8, 1.9, 1.4, 2.0, 1.3, 0.6), (3.5, 0.8, 3.3, 0.8, 3.5))
+    assert repeat(bays) == 2
+    done = split(bays, 1.5 * bays.size)
+    widths = [bays.insertable[k // 2] for k in done.sources if k % 2]
+    assert [w > 1 for w in widths] == [True, False, True, False, True, False, True]
+    assert done.sources[-1] == 10  # its own margin
+    assert repeat(SplitRule((1, 1, 1, 1), (1, 2, 4))) == 0
+    assert repeat(SplitRule((4, 1, 4), (1, 1))) == 0  # its margins belong to it
+    assert split(SplitRule((4, 1, 4), (1, 1)), 22).windows == 4
+
+
+def test_margins_and_plain_walls_take_what_is_left_over():
+    rule = SplitRule((1.0, 1.0, 8.0, 1.0, 1.0), (1.0,) * 4)
+    done = split(rule, 17.0)
+    assert (done.windows, packed(rule, 17.0)) == (4, 5)  # five would squeeze the walls to 77%
+    assert done.stretch == pytest.approx(13 / 12)
+    changes = np.array(done.sizes) / np.array([1, 1, 1, 1, 8, 1, 1, 1, 1])
+    assert changes[[2, 6]] == pytest.approx(1.0, abs=0.05)
+    assert changes[0] == changes[4] == changes[8] > 1.09
+    far = split(rule, 14.0)
+    assert min(far.sizes) >= LEAST_MARGIN
+    assert max(np.array(far.sizes)) <= MOST_MARGIN * 8
 
 
 @given(rules, st.floats(0.5, 60), st.floats(0.5, 60))

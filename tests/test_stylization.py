@@ -317,22 +317,22 @@ def test_textures_stay_inside_the_folder(tmp_path):
     assert any("outside" in note for note in mesh.notes)
 
 
-def test_real_models_are_captured_or_refused_with_a_reason(shared_data, facade, tmp_path):
+def test_real_models_are_captured_or_refused_with_a_reason(shared_data, facade_here, tmp_path):
     folder = shared_data / "textured_buildings"
     for name in ("tecalemit_h", "robust_cube_apartment_sgi_1channel"):
         out = tmp_path / name
-        done = facade("capture-style", folder / name / "model.obj", "-o", out)
+        done = facade_here("capture-style", folder / name / "model.obj", "-o", out)
         assert done.returncode == 0, done.stderr
-        assert facade("validate", out / "stylesheet.json", out / "blocks.json").returncode == 0
+        assert facade_here("validate", out / "stylesheet.json", out / "blocks.json").returncode == 0
         glb = tmp_path / f"{name}.glb"
-        assert facade("retarget", out, out / "blocks.json", "-o", glb).returncode == 0
+        assert facade_here("retarget", out, out / "blocks.json", "-o", glb).returncode == 0
         assert glb.read_bytes()[:4] == b"glTF"
 
 
-def test_a_tampered_sheet_is_refused(facade, tmp_path, shared_data):
+def test_a_tampered_sheet_is_refused(facade_here, tmp_path, shared_data):
     out = tmp_path / "style"
     source = shared_data / "textured_buildings" / "immeuble1" / "model.obj"
-    assert facade("capture-style", source, "-o", out).returncode == 0
+    assert facade_here("capture-style", source, "-o", out).returncode == 0
     path = out / "stylesheet.json"
     document = json.loads(path.read_text())
     for change in (
@@ -343,7 +343,7 @@ def test_a_tampered_sheet_is_refused(facade, tmp_path, shared_data):
         broken = json.loads(json.dumps(document))
         change(broken)
         path.write_text(json.dumps(broken))
-        done = facade("retarget", out, out / "blocks.json", "-o", tmp_path / "x.glb")
+        done = facade_here("retarget", out, out / "blocks.json", "-o", tmp_path / "x.glb")
         assert done.returncode == 3, done.stderr
         assert b"stylesheet.json" in done.stderr
 

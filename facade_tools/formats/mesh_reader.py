@@ -49,11 +49,12 @@ def _through_trimesh(path: Path) -> TexturedMesh:
         except Exception as error:  # trimesh raises whatever its parsers raise
             raise InvalidInput(f"cannot be read as a mesh: {error}").at(str(path)) from None
     parts = []
+    pictures: dict[int, Picture] = {}
     for node in scene.graph.nodes_geometry:
         transform, name = scene.graph[node]
         geometry = scene.geometry[name]
         if isinstance(geometry, trimesh.Trimesh) and len(geometry.faces):
-            parts.append(_part(geometry, np.asarray(transform)))
+            parts.append(_part(geometry, np.asarray(transform), pictures))
     if not parts:
         raise InvalidInput("holds no faces; expected a mesh").at(str(path))
     mesh = joined(parts)
@@ -80,7 +81,8 @@ def _complaints() -> Iterator[list[str]]:
         logger.propagate = propagate
 
 
-def _part(geometry: Any, transform: Floats) -> TexturedMesh:
+def _part(geometry: Any, transform: Floats, pictures: dict[int, Picture]) -> TexturedMesh:
+    """Return a geometry as a mesh; pictures: those decoded so far, by the id of their image."""
     vertices = np.asarray(geometry.vertices, dtype=np.float64)
     vertices = vertices @ transform[:3, :3].T + transform[:3, 3]
     faces = np.asarray(geometry.faces, dtype=np.int64)
@@ -90,17 +92,18 @@ def _part(geometry: Any, transform: Floats) -> TexturedMesh:
         if uv is None or len(uv) != len(vertices)
         else np.asarray(uv, dtype=np.float64)[faces]
     )
-    paint, note = _paint(getattr(geometry.visual, "material", None))
+    paint, note = _paint(getattr(geometry.visual, "material", None), pictures)
     notes = (note,) if note else ()
     return TexturedMesh(vertices, faces, corners, np.zeros(len(faces), np.int64), (paint,), notes)
 
 
-def _paint(material: Any) -> tuple[Paint, str]:
+def _paint(material: Any, pictures: dict[int, Picture]) -> tuple[Paint, str]:
     image = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
     color = np.asarray(getattr(material, "main_color", [*GREY, 255]))[:3]
     name = str(getattr(material, "name", "") or "none")
     rgb = (int(color[0]), int(color[1]), int(color[2]))
     if image is None:
         return Paint(name, rgb), f"part {name!r} has no texture: drawn in its plain colour"
-    picture: Picture = np.asarray(image.convert("RGB"), dtype=np.uint8)
-    return Paint(name, rgb, picture), ""
+    if id(image) not in pictures:
+        pictures[id(image)] = np.asarray(image.convert("RGB"), dtype=np.uint8)
+    return Paint(name, rgb, pictures[id(image)]), ""

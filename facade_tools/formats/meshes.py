@@ -51,7 +51,7 @@ def _material(name: str, paint: Paint, linear: bool) -> Material:
     if paint.picture is None:
         return Material(name, f"#{color.hex()}")
     tint = f"#{color.hex()}" if linear else WHITE
-    return Material(name, tint, texture=png.write(paint.picture))
+    return Material(name, tint, texture=png.write(paint.picture, effort=1))
 
 
 def _srgb(value: int) -> int:

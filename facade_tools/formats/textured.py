@@ -107,14 +107,23 @@ def _bounded(path: Path, limit: int) -> bytes:
 
 
 def joined(parts: list[TexturedMesh]) -> TexturedMesh:
-    """Return one mesh of several, in order."""
+    """Return one mesh of several, in order; paints that are the same stand once."""
     vertex = np.cumsum([0, *(len(part.vertices) for part in parts)])
-    paint = np.cumsum([0, *(len(part.paints) for part in parts)])
+    numbers: dict[tuple[str, tuple[int, int, int], int], int] = {}
+    paints: list[Paint] = []
+    rows = []
+    for part in parts:
+        for paint in part.paints:
+            key = (paint.name, paint.color, id(paint.picture))
+            if numbers.setdefault(key, len(paints)) == len(paints):
+                paints.append(paint)
+        places = [numbers[p.name, p.color, id(p.picture)] for p in part.paints]
+        rows.append(np.array(places, dtype=np.int64)[part.paint])
     return TexturedMesh(
         np.concatenate([part.vertices for part in parts]),
         np.concatenate([part.faces + vertex[i] for i, part in enumerate(parts)]),
         np.concatenate([part.uv for part in parts]),
-        np.concatenate([part.paint + paint[i] for i, part in enumerate(parts)]),
-        tuple(paint for part in parts for paint in part.paints),
+        np.concatenate(rows),
+        tuple(paints),
         tuple(note for part in parts for note in part.notes),
     )

@@ -12,7 +12,7 @@ import numpy as np
 from ..geometry.arrays import Booleans, Floats
 from ..imaging.image_io import Picture
 from .outline import WallFace
-from .rhythm import SHORTEST, period, periodic_labels, profile
+from .rhythm import SHORTEST, period, periodic_labels, profile, regular_labels
 from .splitting import SplitRule, insertable_labels, merged, rule_of, variance_signal
 
 SHAPE_LINK = 0.9  # of eq. 1
@@ -106,8 +106,9 @@ def group_rule(
     size: metres across the rule. axis: 0 splits columns (a horizontal rule), 1 splits rows.
     window: objective window size (m); None takes the median of the sections found, at least 0.3 m.
     Sections of less than half of it are merged. Where the labels tell windows from walls nowhere
-    (a texture of noise) nothing is insertable; where they lump several periods of a texture that
-    repeats into one section, the periods are the sections.
+    (a texture of noise) or leave no wall nothing is insertable; where they lump several periods
+    of a texture that repeats into one section, the periods are the sections; where they nearly
+    repeat with the texture, they are made to.
     """
     mean = mean_picture(pictures, axis)
     signal = variance_signal(mean, axis)
@@ -116,7 +117,11 @@ def group_rule(
     labels = _windows(signal, mean, axis, place, window)
     if length is not None and _longest_run(labels) * place > LUMPED * length:
         labels = periodic_labels(signal, length / place)
-    return rule_of(labels, size)
+    elif length is not None:
+        regular = _merged(regular_labels(labels, length / place), place, window)
+        fewer = _sections(regular) < _sections(labels)
+        labels = labels if fewer or regular.mean() > 1 - LEAST_WALL else regular
+    return rule_of(labels if not labels.all() else ~labels, size)
 
 
 def _windows(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -38,10 +38,18 @@ class Panel:
     seen: Floats
 
 
-def panels(sheet: StyleSheet, placed: Sequence[Placed], slabs: Sequence[list[Slab]]) -> list[Panel]:
-    """Return the visible faces of placed blocks; slabs: the plans of each block's storeys."""
+def panels(
+    sheet: StyleSheet,
+    placed: Sequence[Placed],
+    slabs: Sequence[list[Slab]],
+    aligned: Mapping[str, SplitRule] | None = None,
+) -> list[Panel]:
+    """Return the visible faces of placed blocks; slabs: the plans of each block's storeys.
+
+    aligned: rules of groups that stand in for the sheet's own.
+    """
     rules = {rule.id: SplitRule(rule.a, rule.b) for rule in sheet.rules}
-    of_group = {group.id: rules[group.rule] for group in sheet.groups}
+    of_group = {group.id: rules[group.rule] for group in sheet.groups} | dict(aligned or {})
     walls: dict[tuple[str, int], list[tuple[str, StyleFace]]] = {}
     for wall in sheet.walls:
         for face in wall.faces:

@@ -21,6 +21,7 @@ AMPLE_PIXELS = 8_000_000  # of all faces together, for more than the source's re
 DEFAULT_DENSITY = 16.0  # pixels a metre where the source has no textures
 MAX_DENSITY = 256.0
 REACH = 0.06  # of the plan's size: how far off a face its texture may lie
+UPRIGHT, INCLINED = 0.5, 0.05  # share of a normal that points to the viewer: of walls, of the rest
 
 # side -> axis along the wall, its direction from left to right, axis of the outward normal, sign
 SIDES = {
@@ -87,41 +88,76 @@ def face_pictures(mesh: TexturedMesh, faces: Sequence[WallFace], density: float)
     """Return the picture of every face.
 
     Of several triangles over one pixel the outermost wins, as one sees it from outside; where
-    another face stands before the pixel, the nearest to the face's plane. Pixels that nothing
-    covers take the mean colour of the face, and faces that nothing covers that of the walls.
+    another face stands before the pixel, the nearest to the face's plane. Where no upright
+    triangle is near, the nearest that can be seen from the face's side at all (a slope that
+    became a step, an oblique wing) takes the pixel; then the mean colour of the face; and that of
+    the walls, for faces that nothing covers.
     """
-    paints = palette(mesh)
-    reach = REACH * float(np.ptp(mesh.vertices[:, :2], axis=0).max())
-    vectors = triangle_areas(mesh.vertices, mesh.faces)
-    length = np.maximum(np.linalg.norm(vectors, axis=1), 1e-30)
-    corners = mesh.vertices[mesh.faces]
-    uv = np.where(np.isfinite(mesh.uv), mesh.uv, 0.0)
-    # two-sided models show their texture on either winding
-    facing = [np.flatnonzero(np.abs(vectors[:, axis]) > 0.5 * length) for axis in range(2)]
-    bounds = [(corners[f].min(axis=1), corners[f].max(axis=1)) for f in facing]
-    usual = _usual_colour(mesh, length)
+    extent = float(np.ptp(mesh.vertices[:, :2], axis=0).max())
+    reach = REACH * extent
+    upright, inclined = _shown(mesh, UPRIGHT), _shown(mesh, INCLINED)
+    usual = _usual_colour(mesh)
     results = []
     for face in faces:
-        along, direction, depth, sign = SIDES[face.side]
-        near = facing[depth][_overlaps(*bounds[depth], face, reach)]
-        view = np.stack(
-            [
-                direction * (corners[near][:, :, along] - face.start),
-                face.top - corners[near][:, :, 2],
-                sign * (corners[near][:, :, depth] - face.place),
-            ],
-            axis=-1,
-        )
         shape = (_pixels(face.height, density), _pixels(face.width, density))
         scale = np.array([shape[1] / face.width, shape[0] / face.height])
-        surface = Surface(view, uv[near], mesh.paint[near], paints)
-        drawn = _drawn(surface, scale, shape, reach, _hidden(face, faces, shape, reach))
-        results.append(usual.copy() if drawn is None else drawn)
+        hidden = _hidden(face, faces, shape, reach)
+        picture, covered = _drawn(upright.before(face, reach), scale, shape, reach, hidden)
+        if not covered.all():
+            behind, seen = _rendered(inclined.before(face, extent), scale, shape, 0.0, extent)
+            picture[~covered], covered = behind[~covered], covered | seen
+        results.append(_filled(picture, covered) if covered.any() else usual.copy())
     return results
 
 
-def _usual_colour(mesh: TexturedMesh, area: Floats) -> Picture:
+@dataclass(frozen=True, slots=True)
+class _Shown:
+    """Triangles that can be seen along x and along y.
+
+    corners (m, 3, 3), uv (m, 3, 2), paint (m,). facing: of either axis, the numbers of triangles,
+    with their least and greatest corners.
+    """
+
+    corners: Floats
+    uv: Floats
+    paint: Integers
+    paints: Palette
+    facing: tuple[tuple[Integers, Floats, Floats], ...]
+
+    def before(self, face: WallFace, reach: float) -> Surface:
+        """Return what lies within reach (m) of a face's plane, as seen from its side."""
+        along, direction, depth, sign = SIDES[face.side]
+        numbers, low, high = self.facing[depth]
+        near = numbers[_overlaps(low, high, face, reach)]
+        corners = self.corners[near]
+        view = np.stack(
+            [
+                direction * (corners[:, :, along] - face.start),
+                face.top - corners[:, :, 2],
+                sign * (corners[:, :, depth] - face.place),
+            ],
+            axis=-1,
+        )
+        return Surface(view, self.uv[near], self.paint[near], self.paints)
+
+
+def _shown(mesh: TexturedMesh, share: float) -> _Shown:
+    """Return the triangles whose normals lie along x or y by more than a share.
+
+    Two-sided models show their texture on either winding.
+    """
+    vectors = np.abs(triangle_areas(mesh.vertices, mesh.faces))
+    length = np.maximum(np.linalg.norm(vectors, axis=1), 1e-30)
+    corners = mesh.vertices[mesh.faces]
+    numbers = [np.flatnonzero(vectors[:, axis] > share * length) for axis in range(2)]
+    facing = tuple((n, corners[n].min(axis=1), corners[n].max(axis=1)) for n in numbers)
+    uv = np.where(np.isfinite(mesh.uv), mesh.uv, 0.0)
+    return _Shown(corners, uv, mesh.paint, palette(mesh), facing)
+
+
+def _usual_colour(mesh: TexturedMesh) -> Picture:
     """Return the mean colour of a mesh, weighted by area, as a picture of one pixel."""
+    area = np.linalg.norm(triangle_areas(mesh.vertices, mesh.faces), axis=1)
     means = [p.color if p.picture is None else p.picture.mean(axis=(0, 1)) for p in mesh.paints]
     weights = np.bincount(mesh.paint, area, len(mesh.paints))
     colour = weights @ np.array(means, dtype=np.float64) / max(weights.sum(), 1e-12)
@@ -143,8 +179,9 @@ def top_picture(mesh: TexturedMesh, low: Floats, high: Floats, density: float) -
     uv = np.where(np.isfinite(mesh.uv), mesh.uv, 0.0)[flat]
     scale = np.array([shape[1] / width, shape[0] / depth])
     reach = float(np.ptp(mesh.vertices[:, 2])) + 1.0
-    drawn = _drawn(Surface(view, uv, mesh.paint[flat], palette(mesh)), scale, shape, reach)
-    return np.full((*shape, 3), 190, dtype=np.uint8) if drawn is None else drawn
+    surface = Surface(view, uv, mesh.paint[flat], palette(mesh))
+    picture, covered = _rendered(surface, scale, shape, reach, reach)
+    return _filled(picture, covered) if covered.any() else np.full((*shape, 3), 190, np.uint8)
 
 
 def _pixels(metres: float, density: float) -> int:
@@ -202,18 +239,21 @@ def _drawn(
     scale: Floats,
     shape: tuple[int, int],
     reach: float,
-    hidden: Booleans | None = None,
-) -> Picture | None:
-    """Return the picture of a face, None where nothing covers any of it.
+    hidden: Booleans,
+) -> tuple[Picture, Booleans]:
+    """Return the picture of a face, and which of its pixels anything covers.
 
     hidden: pixels at which the nearest surface is drawn instead of the outermost.
     """
     picture, covered = _rendered(surface, scale, shape, reach, reach)
-    if hidden is not None and hidden.any():
+    if hidden.any():
         nearest, near = _rendered(surface, scale, shape, 0.0, reach)
         picture[hidden], covered[hidden] = nearest[hidden], near[hidden]
-    if not covered.any():
-        return None
+    return picture, covered
+
+
+def _filled(picture: Picture, covered: Booleans) -> Picture:
+    """Give pixels that nothing covers the mean colour of the others."""
     if not covered.all():
         picture[~covered] = np.round(picture[covered].mean(axis=0)).astype(np.uint8)
     return picture

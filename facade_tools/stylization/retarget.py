@@ -16,6 +16,7 @@ from ..geometry.mesh import Material, Mesh, Scene
 from ..imaging.image_io import Picture
 from .atlas import LARGEST_PAGE, PADDING, Atlas, encoded_page, painted, planned
 from .bays import with_bays
+from .columns import aligned_rules
 from .hull import layers, mass, roofs
 from .panels import SMALL, Panel, panels, reassigned
 from .placing import Placed, foreign_blocks, matched_blocks, placed_blocks, placed_slabs
@@ -39,10 +40,11 @@ def retarget(style: Style, target: Blocks, small: float = SMALL) -> Scene:
     target's frame.
     """
     chosen = matched_blocks(style.sheet, style.blocks, target)
+    aligned = aligned_rules(style.sheet, style.blocks)
     style, chosen = with_bays(style, chosen, target)
     placed = placed_blocks(style.sheet, style.blocks, target, chosen)
     slabs = [placed_slabs(style.sheet, item) for item in placed]
-    found = panels(style.sheet, placed, slabs)
+    found = panels(style.sheet, placed, slabs, aligned)
     found = reassigned(found, foreign_blocks(style.blocks, placed), small)
     meshes, materials = _textured(style, placed, found)
     stack = layers([slab for own in slabs for slab in own])

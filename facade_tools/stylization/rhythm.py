@@ -14,6 +14,8 @@ NEARLY = 0.85  # of the best peak: the shortest such period is taken
 SHORTEST = 0.6  # m
 AROUND = 8.0  # m: changes over longer distances are light, not rhythm
 WALL_SHARE = 0.25  # of a period that may be scaled
+REGULAR = 2.6  # periods at least, for one odd bay among them to be told
+JITTER = 0.1  # of a period: differences of edges that are none
 BREAK = 0.35  # correlation with the storey beside, below which a row belongs to no rhythm
 
 
@@ -98,6 +100,38 @@ def periodic_labels(signal: Floats, step: float) -> Booleans:
         if end - start < 0.6 * (1 - WALL_SHARE) * step:
             labels[start:end] = False
     return labels
+
+
+def regular_labels(labels: Booleans, step: float) -> Booleans:
+    """Return labels made periodic where they nearly are.
+
+    labels: (n,). step: their period, in places; the one within 3% that fits best is taken. Between
+    the first and the last insertable place, runs of places take the label that most places of
+    their phase have, if that changes few of them and leaves both kinds; a single odd bay (a shop
+    without an awning, an open window) is then cut like the others. Edges that are off by little
+    stay where they were found.
+    """
+    ends = np.flatnonzero(labels)
+    if not len(ends) or ends[-1] + 1 - ends[0] < REGULAR * step:
+        return labels
+    inner = labels[ends[0] : ends[-1] + 1]
+    tries = [_folded(inner, step * factor) for factor in np.linspace(0.97, 1.03, 25)]
+    best = max(tries, key=lambda tried: float((tried == inner).mean()))
+    if best.all() or (best == inner).mean() < NEARLY:
+        return labels
+    odd = np.diff(np.concatenate([[0], best != inner, [0]]).astype(np.int8))
+    for start, end in zip(np.flatnonzero(odd == 1), np.flatnonzero(odd == -1), strict=True):
+        if end - start <= JITTER * step:
+            best[start:end] = inner[start:end]
+    return np.concatenate([labels[: ends[0]], best, labels[ends[-1] + 1 :]])
+
+
+def _folded(labels: Booleans, step: float) -> Booleans:
+    """Return the label that most places of each phase have."""
+    bins = max(int(step), 1)
+    phase = np.minimum((np.arange(len(labels)) % step / step * bins).astype(np.int64), bins - 1)
+    share = np.bincount(phase, labels, bins) / np.maximum(np.bincount(phase, minlength=bins), 1)
+    return np.asarray((share > 0.5)[phase])
 
 
 def breaks(samples: Floats, step: float) -> tuple[int, int]:

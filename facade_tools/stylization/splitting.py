@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,11 @@ SMOOTHNESS = 0.025  # λ of eq. 3
 END = 0.3  # of the wall that it stands for: the least last wall of a rule
 CROWDED = 0.9  # S_r below this: more windows fit than look right
 TIGHT = 0.2  # of their width that the walls beside a single window keep at least
+ALIKE = 0.1  # of the mean distance of windows: how far sections that repeat may differ
+DENSER = 0.15  # by which windows that go on repeating may stand denser than whole repeats do
+STEADY = 0.01  # by which the distances of windows may change before margins take the rest
+PLAIN = 2.5  # times the median wall between windows, above which a wall is as patient as a margin
+LEAST_MARGIN, MOST_MARGIN = 0.5, 3.0  # of its width
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +41,7 @@ class Split:
     """A face cut by a rule: its sections in order.
 
     sources: index of the section in the rule (even: scalable, odd: insertable). sizes: metres,
-    summing to the face's. windows: S_n. stretch: S_r, the factor on scalable sections.
+    summing to the face's. windows: S_n. stretch: S_r, the mean factor on scalable sections.
     """
 
     sources: tuple[int, ...]
@@ -140,18 +145,47 @@ def split(rule: SplitRule, size: float) -> Split:
     Eq. 8 packs as many windows as fit. Where the scalable sections would be squeezed below 90% or
     stretched beyond 111%, the number of windows whose |log S_r| is least is taken instead; rather
     than none, one whose walls keep a fifth of their width. Windows keep their size, unless the
-    rule has no walls at all.
+    rule has no walls at all. What S_r adds or takes goes to the margins and the widest walls
+    first, so that the distances of windows stay.
     """
     if not rule.insertable:
         return Split((0,), (size,), 0, size / rule.size)
-    packed = _count(rule, size)
-    chosen = _arranged(rule, size, packed)
-    if CROWDED <= chosen.stretch <= 1 / CROWDED:
+    most = packed(rule, size)
+    chosen = _repeated(rule, size, most)
+    if not CROWDED <= chosen.stretch <= 1 / CROWDED:
+        options = (_repeated(rule, size, count) for count in range(most + 1, -1, -1))
+        best = min(options, key=lambda option: abs(math.log(max(option.stretch, 1e-9))))
+        single = _repeated(rule, size, 1)
+        chosen = single if not best.windows and TIGHT <= single.stretch < 1 else best
+    if not chosen.windows:
         return chosen
-    options = (_arranged(rule, size, count) for count in range(packed + 1, -1, -1))
-    best = min(options, key=lambda option: abs(math.log(max(option.stretch, 1e-9))))
-    single = _arranged(rule, size, 1)
-    return single if not best.windows and TIGHT <= single.stretch < 1 else best
+    regular = _arranged(rule, size, _regular(rule, chosen.windows))
+    return _spread(rule, regular if regular.stretch >= LEAST_MARGIN else chosen)
+
+
+def _spread(rule: SplitRule, done: Split) -> Split:
+    """Give what S_r adds or takes to margins and plain walls as far as they can bear it.
+
+    Walls between windows keep their width but for STEADY of the distances; the outermost walls,
+    and those much wider than the usual one, take the rest, down to half and up to three times
+    their own width, and what is left over goes to all by S_r.
+    """
+    own = np.array([_width(rule, source) for source in done.sources])
+    wall = np.array(done.sources) % 2 == 0
+    patient = wall.copy()
+    patient[1:-1] &= own[1:-1] > PLAIN * np.median(rule.scalable[1:-1] or [np.inf])
+    steady = wall & ~patient
+    ample, firm = float(own[patient].sum()), float(own[steady].sum())
+    if min(ample, firm) <= 1e-9:
+        return done
+    room = done.stretch * (ample + firm)
+    give = STEADY * float(own[~patient].sum())
+    wanted = min(max(done.stretch * firm, firm - give), firm + give)
+    left = min(max(room - wanted, LEAST_MARGIN * ample), MOST_MARGIN * ample)
+    if not 0 < left < room:
+        return done
+    factor = np.where(patient, left / ample, np.where(steady, (room - left) / firm, 1.0))
+    return replace(done, sizes=tuple((own * factor).tolist()))
 
 
 def split_rule(rule: SplitRule, size: float) -> SplitRule:
@@ -167,8 +201,8 @@ def split_rule(rule: SplitRule, size: float) -> SplitRule:
     return SplitRule(tuple(walls), tuple(windows))
 
 
-def _count(rule: SplitRule, size: float) -> int:
-    """Return S_n = x·m + y of eq. 8."""
+def packed(rule: SplitRule, size: float) -> int:
+    """Return how many windows fit: S_n = x·m + y of eq. 8."""
     m = len(rule.insertable)
     x = math.floor(size / rule.size + 1e-9)
     rest = size - x * rule.size
@@ -181,10 +215,22 @@ def _count(rule: SplitRule, size: float) -> int:
     return x * m + y
 
 
-def _arranged(rule: SplitRule, size: float, windows: int) -> Split:
+def _repeated(rule: SplitRule, size: float, windows: int) -> Split:
+    """Return x whole repeats of the rule and its first y windows, each between two walls.
+
+    Between the last wall of a repeat and the first of the next both stay (eq. 9 counts both).
+    """
     if not windows:
         return _plain(rule, size)
-    sources = _sequence(rule, windows)
+    m = len(rule.insertable)
+    x, y = divmod(windows, m)
+    tail = range(2 * y + 1) if y or not x else ()
+    return _arranged(rule, size, (*(tuple(range(2 * m + 1)) * x), *tail))
+
+
+def _arranged(rule: SplitRule, size: float, sources: tuple[int, ...]) -> Split:
+    """Return sections in order, the walls between the windows scaled alike (eq. 9)."""
+    windows = len(sources) - sum(not i % 2 for i in sources)
     fixed = math.fsum(rule.insertable[i // 2] for i in sources if i % 2)
     flexible = math.fsum(rule.scalable[i // 2] for i in sources if not i % 2)
     if flexible <= 1e-9:  # no wall between the windows: they take the stretch
@@ -213,16 +259,35 @@ def _plain(rule: SplitRule, size: float) -> Split:
     return Split((2 * widest,), (size,), 0, stretch)
 
 
-def _sequence(rule: SplitRule, windows: int) -> tuple[int, ...]:
-    """Return x whole repeats of the rule and its first y windows, each between two walls.
+def _regular(rule: SplitRule, windows: int) -> tuple[int, ...]:
+    """Return the sections of a face with so many windows that goes on as its rule does.
 
-    Between the last wall of a repeat and the first of the next both stay (eq. 9 counts both).
+    A rule that repeats within itself goes on repeating, and ends with its own margin; any other
+    is repeated as a whole.
     """
-    m = len(rule.insertable)
-    x, y = divmod(windows, m)
-    whole = list(range(2 * m + 1))
-    tail = list(range(2 * y + 1)) if y or not x else []
-    return tuple(whole * x + tail)
+    m, step = len(rule.insertable), repeat(rule)
+    if windows == m or not step:
+        return _repeated(rule, rule.size, windows).sources
+    turn, gaps = m - m % step, m - 1 - (m - 1) % step
+    inner = ((2 * (i % turn) + 1, 2 * (i % gaps) + 2) for i in range(windows))
+    return (*(0, *itertools.chain.from_iterable(inner))[:-1], 2 * m)
+
+
+def repeat(rule: SplitRule) -> int:
+    """Return after how many windows a rule repeats within itself; 0 where it does not.
+
+    A rule whose margins would make whole repeats much thinner or denser does not: eq. 8 counts
+    windows by whole repeats.
+    """
+    walls, windows = np.array(rule.scalable[1:-1]), np.array(rule.insertable)
+    m = len(windows)
+    for step in range(1, (m + 1) // 2 + 1 if m > 1 else 1):
+        pitch = (walls[: m - 1 - (m - 1) % step].mean() if m > step else 0.0) + windows.mean()
+        reach = ALIKE * pitch
+        alike = all(np.ptp(v[k::step]) <= reach for v in (walls, windows) for k in range(step))
+        if alike and step < m and abs(rule.size / m / pitch - 1) <= DENSER:
+            return step
+    return 0
 
 
 def _width(rule: SplitRule, index: int) -> float:

@@ -64,11 +64,12 @@ def positions(
         share = _to_and_fro(share, target / max(width, 1e-9))
         return np.asarray(np.clip((first + share * width) / source, 0.0, 1.0))
     index = np.array(done.sources)[section]
+    stretch = np.diff(borders)[section] / np.maximum(widths[index], 1e-12)
     wall = index % 2 == 0
     index = np.where((section == len(done.sizes) - 1) & (share >= 0.5), end_wall(own, done), index)
-    long = wall & (widths[index] > LONG) & (abs(done.stretch - 1) > TOLERATED)
-    share = np.where(wall & ~long, _to_and_fro(share, done.stretch), share)
-    share = np.where(long, at_scale(share, done.stretch), share)
+    long = wall & (widths[index] > LONG) & (np.abs(stretch - 1) > TOLERATED)
+    share = np.where(wall & ~long, _to_and_fro(share, stretch), share)
+    share = np.where(long, at_scale(share, stretch), share)
     places: Floats = np.clip((starts[index] + share * widths[index]) / source, 0.0, 1.0)
     return places
 
@@ -97,15 +98,13 @@ def _plainest(starts: Floats, widths: Floats, source: float, signal: Floats) -> 
     return best[1], best[2]
 
 
-def _to_and_fro(share: Floats, stretch: float) -> Floats:
+def _to_and_fro(share: Floats, stretch: Floats | float) -> Floats:
     """Run through much stretched walls to and fro instead of smearing their pixels.
 
     An odd number of runs begins and ends like the section itself.
     """
-    if not SMEARED < stretch < math.inf:
-        return share
-    runs = 2 * round((stretch - 1) / 2) + 1
-    return np.abs((share * runs + 1) % 2 - 1)
+    runs = 2 * np.round((np.minimum(stretch, 1e6) - 1) / 2) + 1
+    return np.where(np.greater(stretch, SMEARED), np.abs((share * runs + 1) % 2 - 1), share)
 
 
 def synthesised(
@@ -139,20 +138,19 @@ def _signal(picture: Picture, axis: int) -> Floats:
     return variance_signal(picture[::step] if axis == 0 else picture[:, ::step], axis)
 
 
-def at_scale(share: Floats, stretch: float) -> Floats:
+def at_scale(share: Floats, stretch: Floats | float) -> Floats:
     """Bring a section to a new size at its own scale; both its ends stay where they were.
 
     What is shorter leaves its middle out; what is longer runs back over its middle.
     """
     place = share * stretch
-    if stretch < 1:
-        return np.where(share < 0.5, place, place + 1 - stretch)
-    if stretch > 3:
-        return _to_and_fro(share, stretch)
-    back = 0.5 * (stretch - 1)
+    shorter = np.where(share < 0.5, place, place + 1 - stretch)
+    back = 0.5 * (np.minimum(stretch, 3.0) - 1)
     turn = 0.5 + 0.5 * back
     middle = np.where(place < turn + back, 2 * turn - place, place - 2 * back)
-    return np.where(place < turn, place, middle)
+    longer = np.where(place < turn, place, middle)
+    longer = np.where(np.greater(stretch, 3.0), _to_and_fro(share, stretch), longer)
+    return np.where(np.less(stretch, 1.0), shorter, longer)
 
 
 def shape_of(target: tuple[float, float], density: float, part: Part = WHOLE) -> tuple[int, int]:

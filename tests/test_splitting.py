@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from facade_tools.stylization.splitting import (
-    LEAST_MARGIN,
-    MOST_MARGIN,
+    MARGINS,
     SplitRule,
     insertable_labels,
     merged,
@@ -22,7 +21,7 @@ from facade_tools.stylization.splitting import (
     two_means,
     variance_signal,
 )
-from facade_tools.stylization.synthesis import at_scale
+from facade_tools.stylization.synthesis import at_scale, filled, positions
 
 signals = st.lists(st.floats(0, 1), min_size=2, max_size=9).map(np.array)
 widths = st.floats(0.2, 4)
@@ -129,7 +128,7 @@ def test_a_rule_that_repeats_within_itself_goes_on():
     assert repeat(bays) == 2
     done = split(bays, 1.5 * bays.size)
     widths = [bays.insertable[k // 2] for k in done.sources if k % 2]
-    assert [w > 1 for w in widths] == [True, False, True, False, True, False, True]
+    assert [w > 1 for w in widths] == [True, False] * 4
     assert done.sources[-1] == 10  # its own margin
     assert repeat(SplitRule((1, 1, 1, 1), (1, 2, 4))) == 0
     assert repeat(SplitRule((4, 1, 4), (1, 1))) == 0  # its margins belong to it
@@ -145,8 +144,8 @@ def test_margins_and_plain_walls_take_what_is_left_over():
     assert changes[[2, 6]] == pytest.approx(1.0, abs=0.05)
     assert changes[0] == changes[4] == changes[8] > 1.09
     far = split(rule, 14.0)
-    assert min(far.sizes) >= LEAST_MARGIN
-    assert max(np.array(far.sizes)) <= MOST_MARGIN * 8
+    assert min(far.sizes) >= MARGINS[0]
+    assert max(np.array(far.sizes)) <= MARGINS[1] * 8
 
 
 @given(rules, st.floats(0.5, 60), st.floats(0.5, 60))
@@ -176,3 +175,24 @@ def test_long_walls_keep_the_scale_of_what_is_on_them(stretch):
     assert np.mean(np.abs(step - 1) < 0.01) > 0.999
     assert (places[0], places[-1]) == pytest.approx((0, 1))
     assert 0 <= places.min() <= places.max() <= 1
+
+
+@pytest.mark.parametrize("stretch", [2.0, 3.4, 11.0])
+def test_much_wider_walls_show_their_plainest_part_between_their_ends(stretch):
+    places = filled(np.linspace(0, 1, 5001), stretch, (0.4, 0.2))
+    assert (places[0], places[-1]) == pytest.approx((0, 1))
+    middle = places[round(5000 * 0.51 / stretch) : round(5000 * (1 - 0.51 / stretch))]
+    assert 0.4 - 1e-9 <= middle.min() <= middle.max() <= 0.6 + 1e-9
+    step = np.abs(np.diff(places)) * 5000 / stretch
+    assert np.mean(np.abs(step - 1) < 0.01) > 0.98
+
+
+def test_a_sill_stays_with_its_window():
+    rule = SplitRule((0.5, 0.5), (3.0,))
+    signal = np.zeros(400)
+    signal[50:350], signal[350:365] = 1.0, 0.3  # the window, and the sill below it
+    places = positions(rule, 4.0, 6.0, 600, lambda: signal) * 4.0
+    sill = (places > 3.5) & (places < 3.65)
+    edges = np.flatnonzero(np.diff(sill))
+    assert len(edges) == 2
+    assert edges[1] - edges[0] == pytest.approx(15, abs=2)

@@ -13,9 +13,10 @@ from itertools import pairwise
 import numpy as np
 
 from ..artifacts.blocks import Blocks
-from ..artifacts.stylesheet import Group, Rule, StyleFace, StyleFloor
+from ..artifacts.stylesheet import Group, Rule, StyleFace, StyleFloor, StyleSheet
 from ..geometry.arrays import Booleans, Floats
 from ..imaging.image_io import Picture
+from .columns import FLUSH, common_rule
 from .groups import LEAST_WALL, MULLION
 from .projection import SIDES
 from .splitting import SplitRule, end_wall, insertable_labels, merged, rule_of, split
@@ -26,6 +27,7 @@ SHARE = 0.15  # of the height that has relief somewhere, for a block to have bay
 FINE, MOST = 0.02, 4000  # m: places of the depth signal, and how many at most
 NARROWEST, WIDEST = 0.2, 8.0  # m: of a bay; wider relief is a wing, and stretches with its block
 CORNERS = 0.2  # of a wall in the plane of its corners, for that to be its plane
+PATIENCE = 0.7, 1.5  # least and most that the walls beside bays take: their pictures stretch, too
 SAME = 0.01  # change of size that leaves all as it is
 PLAIN = Group("bay", "vertical", "bay")  # of parts of faces: they are stretched with their piece
 
@@ -119,7 +121,7 @@ def _plane(depths: Floats, widths: Floats) -> float:
 
 def pieces(bays: Bays, size: float, target: float) -> list[Piece]:
     """Return the pieces, in order, of a block whose size (m) becomes the target's."""
-    done = split(bays.rule, max(target - bays.low - bays.high, 1e-3))
+    done = split(bays.rule, max(target - bays.low - bays.high, 1e-3), PATIENCE)
     widths = np.empty(2 * len(bays.rule.insertable) + 1)
     widths[::2], widths[1::2] = bays.rule.scalable, bays.rule.insertable
     starts = bays.low + np.concatenate([[0.0], np.cumsum(widths)])
@@ -158,7 +160,7 @@ def _with_bays(style: Style, name: str, axis: int, target: float) -> tuple[Style
     bays = relief_bays([sheet.floors[i] for i in numbers], axis, size)
     if bays is None or abs(target / size - 1) < SAME:
         return style, name
-    found = pieces(bays, size, target)
+    found = pieces(_with_windows(bays, sheet, name, axis), size, target)
     new = f"{name}/{'xy'[axis]}{len(sheet.blocks)}"
     pictures = dict(style.pictures)
     floors = [replace(_floor(sheet.floors[i], axis, found), block=new) for i in numbers]
@@ -188,6 +190,27 @@ def _with_bays(style: Style, name: str, axis: int, target: float) -> tuple[Style
     own = next(b for b in style.blocks.blocks if b.id == name)
     blocks = replace(style.blocks, blocks=(*style.blocks.blocks, replace(own, id=new)))
     return replace(style, sheet=sheet, blocks=blocks, pictures=pictures), new
+
+
+def _with_windows(bays: Bays, sheet: StyleSheet, name: str, axis: int) -> Bays:
+    """Return bays that hold the windows painted on the block's walls too, if in line with them."""
+    rules = {rule.id: SplitRule(rule.a, rule.b) for rule in sheet.rules}
+    of_group = {group.id: rules[group.rule] for group in sheet.groups}
+    walls = [w for w in sheet.walls if w.block == name and SIDES[w.side][0] == axis]
+    faces = [(wall.side, face) for wall in walls for face in wall.faces]
+    faces.sort(key=lambda item: -abs(item[1].end - item[1].start) * (item[1].top - item[1].bottom))
+    rule, reach = bays.rule, FLUSH * bays.rule.size
+    for side, face in faces:
+        low, high = sorted((face.start, face.end))
+        own = of_group[face.vertical]
+        if max(abs(low - bays.low), abs(high - bays.low - rule.size)) > reach or not own.insertable:
+            continue
+        if SIDES[side][1] < 0:  # as seen from outside it runs the other way
+            own = SplitRule(own.scalable[::-1], own.insertable[::-1])
+        both = common_rule(rule, own)
+        if both is not None and len(both.insertable) == len(rule.insertable):
+            rule = both
+    return replace(bays, rule=rule)
 
 
 def _floor(floor: StyleFloor, axis: int, found: Sequence[Piece]) -> StyleFloor:

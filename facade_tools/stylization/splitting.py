@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,12 +16,13 @@ from ..geometry.arrays import Booleans, Floats
 SMOOTHNESS = 0.025  # λ of eq. 3
 END = 0.3  # of the wall that it stands for: the least last wall of a rule
 CROWDED = 0.9  # S_r below this: more windows fit than look right
+LEAST_WALLS = 0.5  # S_r below which a rule is repeated as a whole rather than regularly
 TIGHT = 0.2  # of their width that the walls beside a single window keep at least
 ALIKE = 0.1  # of the mean distance of windows: how far sections that repeat may differ
 DENSER = 0.15  # by which windows that go on repeating may stand denser than whole repeats do
 STEADY = 0.01  # by which the distances of windows may change before margins take the rest
 PLAIN = 2.5  # times the median wall between windows, above which a wall is as patient as a margin
-LEAST_MARGIN, MOST_MARGIN = 0.5, 3.0  # of its width
+MARGINS = 0.5, 3.0  # least and most of their width that margins take
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,49 +141,64 @@ def rule_of(labels: Booleans, size: float) -> SplitRule:
     return SplitRule(tuple(widths[::2]), tuple(widths[1::2]))
 
 
-def split(rule: SplitRule, size: float) -> Split:
+def split(rule: SplitRule, size: float, patience: tuple[float, float] = MARGINS) -> Split:
     """Cut a face of `size` metres: repeat insertable sections, scale the others (eq. 8 and 9).
 
     Eq. 8 packs as many windows as fit. Where the scalable sections would be squeezed below 90% or
-    stretched beyond 111%, the number of windows whose |log S_r| is least is taken instead; rather
-    than none, one whose walls keep a fifth of their width. Windows keep their size, unless the
-    rule has no walls at all. What S_r adds or takes goes to the margins and the widest walls
-    first, so that the distances of windows stay.
+    stretched beyond 111%, the number of windows is taken that changes their distances and S_r
+    least; rather than none, one whose walls keep a fifth of their width. Windows keep their size,
+    unless the rule has no walls at all. What S_r adds or takes goes to the margins and the widest
+    walls first, within their patience (least and greatest factor on them).
     """
     if not rule.insertable:
         return Split((0,), (size,), 0, size / rule.size)
     most = packed(rule, size)
     chosen = _repeated(rule, size, most)
-    if not CROWDED <= chosen.stretch <= 1 / CROWDED:
-        options = (_repeated(rule, size, count) for count in range(most + 1, -1, -1))
-        best = min(options, key=lambda option: abs(math.log(max(option.stretch, 1e-9))))
-        single = _repeated(rule, size, 1)
-        chosen = single if not best.windows and TIGHT <= single.stretch < 1 else best
-    if not chosen.windows:
-        return chosen
-    regular = _arranged(rule, size, _regular(rule, chosen.windows))
-    return _spread(rule, regular if regular.stretch >= LEAST_MARGIN else chosen)
+    if chosen.windows and CROWDED <= chosen.stretch <= 1 / CROWDED:
+        regular = _regular(rule, size, most)
+        return _spread(rule, regular if regular.stretch > LEAST_WALLS else chosen, patience)
+    options = [_spread(rule, _regular(rule, size, n), patience) for n in range(most + 1, 0, -1)]
+    best = min((o for o in options if o.stretch > TIGHT), key=partial(_change, rule), default=None)
+    return _plain(rule, size) if best is None or _bare(rule, size, best) else best
 
 
-def _spread(rule: SplitRule, done: Split) -> Split:
+def _bare(rule: SplitRule, size: float, best: Split) -> bool:
+    """Tell whether a face is nearer to its widest wall alone than to one with a window."""
+    plain = abs(math.log(max(_plain(rule, size).stretch, 1e-9)))
+    return best.stretch > 1 and plain < abs(math.log(best.stretch))
+
+
+def _change(rule: SplitRule, done: Split) -> float:
+    """Return how far a split changes the distances of windows, and half of how far S_r is off."""
+    own, patient = _patient(rule, done)
+    before, after = own[~patient].sum(), np.array(done.sizes)[~patient].sum()
+    distances = abs(math.log(max(float(after), 1e-9) / float(before)))
+    return distances + 0.5 * abs(math.log(max(done.stretch, 1e-9)))
+
+
+def _patient(rule: SplitRule, done: Split) -> tuple[Floats, Booleans]:
+    """Return the widths (m) of sections in the rule, and which are margins or plain walls."""
+    own = np.array([_width(rule, source) for source in done.sources])
+    patient = np.array(done.sources) % 2 == 0
+    patient[1:-1] &= own[1:-1] > PLAIN * np.median(rule.scalable[1:-1] or [np.inf])
+    return own, patient
+
+
+def _spread(rule: SplitRule, done: Split, patience: tuple[float, float]) -> Split:
     """Give what S_r adds or takes to margins and plain walls as far as they can bear it.
 
     Walls between windows keep their width but for STEADY of the distances; the outermost walls,
-    and those much wider than the usual one, take the rest, down to half and up to three times
-    their own width, and what is left over goes to all by S_r.
+    and those much wider than the usual one, take the rest, and what is left over goes to all.
     """
-    own = np.array([_width(rule, source) for source in done.sources])
-    wall = np.array(done.sources) % 2 == 0
-    patient = wall.copy()
-    patient[1:-1] &= own[1:-1] > PLAIN * np.median(rule.scalable[1:-1] or [np.inf])
-    steady = wall & ~patient
+    own, patient = _patient(rule, done)
+    steady = (np.array(done.sources) % 2 == 0) & ~patient
     ample, firm = float(own[patient].sum()), float(own[steady].sum())
     if min(ample, firm) <= 1e-9:
         return done
     room = done.stretch * (ample + firm)
     give = STEADY * float(own[~patient].sum())
     wanted = min(max(done.stretch * firm, firm - give), firm + give)
-    left = min(max(room - wanted, LEAST_MARGIN * ample), MOST_MARGIN * ample)
+    left = min(max(room - wanted, patience[0] * ample), patience[1] * ample)
     if not 0 < left < room:
         return done
     factor = np.where(patient, left / ample, np.where(steady, (room - left) / firm, 1.0))
@@ -259,18 +276,18 @@ def _plain(rule: SplitRule, size: float) -> Split:
     return Split((2 * widest,), (size,), 0, stretch)
 
 
-def _regular(rule: SplitRule, windows: int) -> tuple[int, ...]:
-    """Return the sections of a face with so many windows that goes on as its rule does.
+def _regular(rule: SplitRule, size: float, windows: int) -> Split:
+    """Return a face with so many windows that goes on as its rule does.
 
     A rule that repeats within itself goes on repeating, and ends with its own margin; any other
     is repeated as a whole.
     """
     m, step = len(rule.insertable), repeat(rule)
     if windows == m or not step:
-        return _repeated(rule, rule.size, windows).sources
+        return _repeated(rule, size, windows)
     turn, gaps = m - m % step, m - 1 - (m - 1) % step
     inner = ((2 * (i % turn) + 1, 2 * (i % gaps) + 2) for i in range(windows))
-    return (*(0, *itertools.chain.from_iterable(inner))[:-1], 2 * m)
+    return _arranged(rule, size, (*(0, *itertools.chain.from_iterable(inner))[:-1], 2 * m))
 
 
 def repeat(rule: SplitRule) -> int:

@@ -18,7 +18,7 @@ from .splitting import SplitRule, end_wall, split, variance_signal
 PLAIN = 0.5  # of a wall beside windows, that a face without windows is made of
 TOLERATED = 0.1  # stretch of a texture in which no windows were found
 LONG = 3.0  # m: walls that keep the scale of what is on them when they are stretched by more
-SMEARED = 2.0  # stretch of walls beyond which their texture repeats
+SMEARED, FILLED = 2.0, 3.0  # stretch of walls, of long walls, beyond which their texture repeats
 Part = tuple[tuple[float, float], tuple[float, float]]  # shares: left and right, top and bottom
 WHOLE: Part = ((0.0, 1.0), (0.0, 1.0))
 Singles = NDArray[np.float32]
@@ -61,15 +61,21 @@ def positions(
     starts = np.concatenate([[0.0], np.cumsum(widths)])[:-1]
     if own.insertable and not done.windows and signal is not None:
         first, width = _plainest(starts[::2], widths[::2], source, signal())
-        share = _to_and_fro(share, target / max(width, 1e-9))
+        share = np.abs((share * target / max(width, 1e-9) + 1) % 2 - 1)
         return np.asarray(np.clip((first + share * width) / source, 0.0, 1.0))
     index = np.array(done.sources)[section]
-    stretch = np.diff(borders)[section] / np.maximum(widths[index], 1e-12)
     wall = index % 2 == 0
     index = np.where((section == len(done.sizes) - 1) & (share >= 0.5), end_wall(own, done), index)
+    stretch = np.diff(borders)[section] / np.maximum(widths[index], 1e-12)
     long = wall & (widths[index] > LONG) & (np.abs(stretch - 1) > TOLERATED)
-    share = np.where(wall & ~long, _to_and_fro(share, stretch), share)
-    share = np.where(long, at_scale(share, stretch), share)
+    share = np.where(long & (stretch <= FILLED), at_scale(share, stretch), share)
+    for k in np.unique(index[wall & (stretch > np.where(long, FILLED, SMEARED))]).tolist():
+        here = wall & (index == k)
+        strip = (0.0, 1.0)
+        if signal is not None and widths[k] > 0:
+            first, width = _plainest(starts[k : k + 1], widths[k : k + 1], source, signal())
+            strip = ((first - starts[k]) / widths[k], width / widths[k])
+        share[here] = filled(share[here], stretch[here], strip)
     places: Floats = np.clip((starts[index] + share * widths[index]) / source, 0.0, 1.0)
     return places
 
@@ -98,13 +104,18 @@ def _plainest(starts: Floats, widths: Floats, source: float, signal: Floats) -> 
     return best[1], best[2]
 
 
-def _to_and_fro(share: Floats, stretch: Floats | float) -> Floats:
-    """Run through much stretched walls to and fro instead of smearing their pixels.
+def filled(share: Floats, stretch: Floats | float, strip: tuple[float, float]) -> Floats:
+    """Bring a section to a much larger size at its own scale: its halves stay at their ends.
 
-    An odd number of runs begins and ends like the section itself.
+    What is between them shows the strip (start and width, shares of the section) to and fro, so
+    that neither are pixels smeared nor does what frames a window appear where none is.
     """
-    runs = 2 * np.round((np.minimum(stretch, 1e6) - 1) / 2) + 1
-    return np.where(np.greater(stretch, SMEARED), np.abs((share * runs + 1) % 2 - 1), share)
+    place = share * stretch
+    runs = (place - 0.5) / max(strip[1], 1e-9)
+    middle = strip[0] + strip[1] * np.abs((runs + 1) % 2 - 1)
+    return np.where(
+        place < 0.5, place, np.where(place > stretch - 0.5, place - stretch + 1, middle)
+    )
 
 
 def synthesised(
@@ -141,15 +152,15 @@ def _signal(picture: Picture, axis: int) -> Floats:
 def at_scale(share: Floats, stretch: Floats | float) -> Floats:
     """Bring a section to a new size at its own scale; both its ends stay where they were.
 
-    What is shorter leaves its middle out; what is longer runs back over its middle.
+    What is shorter leaves its middle out; what is longer, up to three times as long, runs back
+    over its middle.
     """
     place = share * stretch
     shorter = np.where(share < 0.5, place, place + 1 - stretch)
-    back = 0.5 * (np.minimum(stretch, 3.0) - 1)
+    back = 0.5 * (stretch - 1)
     turn = 0.5 + 0.5 * back
     middle = np.where(place < turn + back, 2 * turn - place, place - 2 * back)
     longer = np.where(place < turn, place, middle)
-    longer = np.where(np.greater(stretch, 3.0), _to_and_fro(share, stretch), longer)
     return np.where(np.less(stretch, 1.0), shorter, longer)
 
 

@@ -161,9 +161,12 @@ def test_messages_are_bayes_rule(case):
     local = rng.normal(0, 20, (8, clusters))
     hidden = rng.dirichlet(np.ones(clusters), styles)
     prior, weight = rng.dirichlet(np.ones(styles), 8), rng.random(8)
-    likelihood, mass, upwards = message(local, hidden)
+    logs, product = np.ones((8, styles)), rng.choice([1.0, 1e-130], (8, styles))
+    before = logs + np.log(product)
+    likelihood, mass = message(local, hidden, logs, product)
     both = hidden[None] * np.exp(local)[:, None, :]  # (n, |S|, K)
-    np.testing.assert_allclose(upwards, np.log(both.sum(axis=2)), rtol=1e-9)
+    found = logs + np.log(product) - before
+    np.testing.assert_allclose(found, np.log(both.sum(axis=2)), rtol=1e-9, atol=1e-9)
     joint = both / both.sum(axis=2, keepdims=True) * prior[:, :, None]
     found, counts = downward(likelihood, mass, hidden, prior, weight)
     np.testing.assert_allclose(found, joint.sum(axis=1), rtol=1e-9, atol=1e-12)

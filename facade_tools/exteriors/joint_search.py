@@ -13,11 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from . import mixture
-from .em import NOTHING, Fit, Stop, run
+from .em import NOTHING, Fit, Stop, fit_bits, fit_table, run
 from .lateral import Inputs, acyclic, admissible, crowded, parent_of
 from .network import Network, inputs_of
 from .score import cheeseman_stutz
 from .structure_search import Search, Tried
+from .styles import cut as cut_style
 
 TOGETHER = Stop(relative=1e-5, iterations=40)
 TRIAL = Stop(relative=1e-5, iterations=8)
@@ -60,13 +61,15 @@ def settled_together(search: Search, network: Network) -> Joint:
     if not search.limits.lateral:
         return best
     failed: set[tuple[int, Inputs]] = set()
-    best = settled_edges(search, best, failed)
-    grown = settled_sizes(search, best)
-    if grown is best:
-        return best
-    pairs = zip(grown.fit.network.families, best.fit.network.families, strict=True)
-    resized = {g for g, (a, b) in enumerate(pairs) if len(a.coef) != len(b.coef)}
-    return settled_edges(search, grown, {(g, inputs) for g, inputs in failed if g not in resized})
+    while True:
+        best = settled_edges(search, best, failed)
+        grown = settled_styles(search, settled_sizes(search, best))
+        if grown is best:
+            return best
+        pairs = zip(grown.fit.network.families, best.fit.network.families, strict=True)
+        resized = {g for g, (a, b) in enumerate(pairs) if len(a.coef) != len(b.coef)}
+        failed = {(g, inputs) for g, inputs in failed if g not in resized}
+        best = grown
 
 
 def settled_edges(search: Search, best: Joint, failed: set[tuple[int, Inputs]]) -> Joint:
@@ -94,6 +97,33 @@ def settled_sizes(search: Search, best: Joint) -> Joint:
     for g in range(len(search.layout.groups)):
         best = grown(search, best, g)
     return best
+
+
+def settled_styles(search: Search, best: Joint) -> Joint:
+    """Cut a style in two, the one that gains most, while that raises the score."""
+    while len(best.fit.network.style) < search.limits.largest:
+        cuts = [restyled(search, best.fit, s) for s in range(len(best.fit.network.style))]
+        after = max((trial(search, one, best) for one in cuts), key=lambda one: one.score)
+        if after.score <= best.score:
+            return best
+        best = after
+    return best
+
+
+def restyled(search: Search, fit: Fit, s: int) -> Network:
+    """Return the network with style s cut across the direction in which its rows differ most."""
+    weights, prior, data = search.weights, search.prior, search.data
+    look = np.concatenate([*fit.posterior.clusters, np.maximum(data.bits, 0)], axis=1)
+    style = cut_style(fit.posterior.style, look, weights.style, s)
+    families = tuple(
+        replace(family, hidden=fit_table((style * w[:, None]).T @ clusters, prior.hidden))
+        for family, w, clusters in zip(
+            fit.network.families, weights.groups, fit.posterior.clusters, strict=True
+        )
+    )
+    share = fit_table(weights.style @ style, prior.style)
+    bits = fit_bits(data, weights, style, prior)
+    return replace(fit.network, style=share, bits=bits, families=families)
 
 
 def grown(search: Search, best: Joint, g: int) -> Joint:

@@ -21,6 +21,7 @@ Masks = NDArray[np.bool_]
 LOG_2PI = log(2.0 * pi)
 NEGLIGIBLE = 1e-9  # a responsibility below it adds nothing
 LEAST_PROBABILITY = 1e-300
+SMALL = 1e-140  # a product below it goes into the logarithm before it vanishes
 
 
 @compiled
@@ -85,15 +86,33 @@ def solve_upper(factor: Floats, size: int, v: Floats) -> None:
 
 
 @compiled
+def whiten(
+    factor: Floats, coef: Floats, index: Ints, size: int, inverse: Floats, slopes: Floats
+) -> None:
+    """Write L⁻¹ (lower triangle) and L⁻¹ coef of the chosen coordinates."""
+    for j in range(size):
+        inverse[j, j] = 1.0 / factor[j, j]
+        for i in range(j + 1, size):
+            total = 0.0
+            for m in range(j, i):
+                total += factor[i, m] * inverse[m, j]
+            inverse[i, j] = -total / factor[i, i]
+    for a in range(size):
+        for q in range(coef.shape[1]):
+            slopes[a, q] = 0.0
+            for b in range(a + 1):
+                slopes[a, q] += inverse[a, b] * coef[index[b], q]
+
+
+@compiled
 def gaussian(
     x: Floats, z: Floats, order: Ints, starts: Ints, masks: Masks, coef: Floats, cov: Floats
 ) -> Floats:
     """Return log N(x observed | coef[k] (1, z), cov[k]): (n, K); rows without any give 0."""
-    clusters, d = coef.shape[0], coef.shape[1]
+    clusters, d, width = coef.shape
     out = np.zeros((x.shape[0], clusters))
     index = np.empty(d, np.int64)
-    factor = np.empty((d, d))
-    v = np.empty(d)
+    factor, inverse, slopes = np.empty((d, d)), np.empty((d, d)), np.empty((d, width))
     for p in range(masks.shape[0]):
         size = chosen(masks[p], index)
         if size == 0:
@@ -103,13 +122,17 @@ def gaussian(
                 for b in range(size):
                     factor[a, b] = cov[k, index[a], index[b]]
             constant = -0.5 * (cholesky(factor, size) + size * LOG_2PI)
+            whiten(factor, coef[k], index, size, inverse, slopes)
             for r in range(starts[p], starts[p + 1]):
                 n = order[r]
-                residual(coef[k], z[n], x[n], index, size, v)
-                solve_lower(factor, size, v)
                 total = 0.0
                 for a in range(size):
-                    total += v[a] * v[a]
+                    v = -slopes[a, 0]
+                    for q in range(1, width):
+                        v -= slopes[a, q] * z[n, q - 1]
+                    for b in range(a + 1):
+                        v += inverse[a, b] * x[n, index[b]]
+                    total += v * v
                 out[n, k] = constant - 0.5 * total
     return out
 
@@ -210,7 +233,8 @@ def moments(  # noqa: C901 - one pass over the rows, compiled
                 for q in range(1, width):
                     u[q] = z[n, q - 1]
                 if size == d:
-                    full[:] = x[n]
+                    for i in range(d):
+                        full[i] = x[n, i]
                 else:
                     residual(coef[k], z[n], x[n], index, size, v)
                     fill_mean(cov[k], factor, masks[p], index, size, v, full)
@@ -218,13 +242,15 @@ def moments(  # noqa: C901 - one pass over the rows, compiled
                         for q in range(width):
                             full[i] += coef[k, i, q] * u[q]
                 for q in range(width):
+                    part = w * u[q]
                     for m in range(q + 1):
-                        uu[k, q, m] += w * u[q] * u[m]
+                        uu[k, q, m] += part * u[m]
                 for i in range(d):
+                    part = w * full[i]
                     for q in range(width):
-                        xu[k, i, q] += w * full[i] * u[q]
+                        xu[k, i, q] += part * u[q]
                     for j in range(i + 1):
-                        xx[k, i, j] += w * full[i] * full[j]
+                        xx[k, i, j] += part * full[j]
             if size < d:
                 xx[k] += mass * extra
     for k in range(clusters):
@@ -237,27 +263,34 @@ def moments(  # noqa: C901 - one pass over the rows, compiled
 
 
 @compiled
-def message(local: Floats, hidden: Floats) -> tuple[Floats, Floats, Floats]:
+def message(local: Floats, hidden: Floats, logs: Floats, product: Floats) -> tuple[Floats, Floats]:
     """Sum the hidden variable out of local log densities (n, K) under P(H | S) (|S|, K).
 
-    Returned: likelihood (n, K), scaled to 1 at the top; its share (n, |S|) under each style; the
-    log density of the group given S (n, |S|).
+    Returned: likelihood (n, K), scaled to 1 at the top; its mass (n, |S|) under each style. The
+    group's density given S joins logs + ln(product), (n, |S|) each: one logarithm for many groups.
     """
     rows, clusters = local.shape
     likelihood = np.empty((rows, clusters))
     mass = np.zeros((rows, hidden.shape[0]))
-    upwards = np.empty((rows, hidden.shape[0]))
     wide = hidden.T.copy()
     for n in range(rows):
         top = local[n].max()
         for k in range(clusters):
-            likelihood[n, k] = np.exp(local[n, k] - top)
+            likely, table = np.exp(local[n, k] - top), wide[k]
+            likelihood[n, k] = likely
             for s in range(hidden.shape[0]):
-                mass[n, s] += wide[k, s] * likelihood[n, k]
+                mass[n, s] += table[s] * likely
         for s in range(hidden.shape[0]):
             mass[n, s] = max(mass[n, s], LEAST_PROBABILITY)
-            upwards[n, s] = np.log(mass[n, s]) + top
-    return likelihood, mass, upwards
+            logs[n, s] += top
+            if mass[n, s] < SMALL:
+                logs[n, s] += np.log(mass[n, s])
+            else:
+                product[n, s] *= mass[n, s]
+                if product[n, s] < SMALL:
+                    logs[n, s] += np.log(product[n, s])
+                    product[n, s] = 1.0
+    return likelihood, mass
 
 
 @compiled

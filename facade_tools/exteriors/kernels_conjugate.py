@@ -18,6 +18,7 @@ from .kernels import (
     Floats,
     Ints,
     cholesky,
+    chosen,
     solve_lower,
     solve_upper,
 )
@@ -221,17 +222,15 @@ def clear_regression(x: Floats, u: Floats, weight: Floats, clear: float) -> tupl
     """
     d, width = x.shape[1], u.shape[1]
     coef, spread = np.zeros((d, width)), np.empty(d)
-    index, t = np.empty(width, np.int64), np.empty(width)
+    index, keep, t = np.empty(width, np.int64), np.empty(width, np.bool_), np.empty(width)
     for i in range(d):
-        for q in range(width):
-            index[q] = q
-        least_squares(u, x[:, i], weight[:, i], index, width, coef[i], t)
-        size = 0
-        for q in range(width):
-            coef[i, q] = 0.0
-            if q == 0 or abs(t[q]) >= clear:
-                index[size] = q
-                size += 1
+        keep[:] = True
+        size = chosen(keep, index)
+        least_squares(u, x[:, i], weight[:, i], index, size, coef[i], t)
+        for q in range(1, width):
+            keep[q] = abs(t[q]) >= clear
+        coef[i] = 0.0
+        size = chosen(keep, index)
         spread[i] = least_squares(u, x[:, i], weight[:, i], index, size, coef[i], t)
     return coef, spread
 

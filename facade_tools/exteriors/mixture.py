@@ -106,8 +106,8 @@ def regression(task: Task, inputs: tuple[int, ...]) -> Pooled | None:
     if not inputs:
         return None
     data = task.data.groups[task.group]
-    u = np.column_stack([np.ones(len(data.x)), task.data.features[:, inputs]])
-    weight = task.weight[:, None] * data.dense
+    u = np.ascontiguousarray(np.column_stack([np.ones(len(data.x)), task.data.features[:, inputs]]))
+    weight = np.ascontiguousarray(task.weight[:, None] * data.dense)
     return Pooled(*clear_regression(data.x, u, weight, CLEAR))
 
 

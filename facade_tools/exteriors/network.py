@@ -97,7 +97,7 @@ def inputs_of(family: Family, features: Floats) -> Floats:
     """Return the features that the group's lateral parents show, (n, inputs)."""
     if not family.inputs:
         return np.empty((len(features), 0))
-    return np.ascontiguousarray(features[:, family.inputs])
+    return features.take(family.inputs, axis=1)
 
 
 def bit_log_density(probability: Floats, bits: Bits) -> Floats:
@@ -116,23 +116,14 @@ def log_sum(a: Floats) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """What a group says upwards: log P(group | S) (n, |S|).
+    """What a group says upwards.
 
     likelihood (n, K): P(group | H), scaled to 1 at each row's top; mass (n, |S|): its sum under
     P(H | S). Of a group that hangs on S itself both are empty.
     """
 
-    upwards: Floats
     likelihood: Floats
     mass: Floats
-
-
-def message_of(family: Family, local: Floats) -> Message:
-    """Return the message of log densities (n, K): the hidden variable summed out."""
-    if family.direct:
-        return Message(local, local[:, :0], local[:, :0])
-    likelihood, mass, upwards = message(local, family.hidden)
-    return Message(upwards, likelihood, mass)
 
 
 def infer(network: Network, data: Dataset, weights: Weights | None = None) -> Posterior:
@@ -159,14 +150,17 @@ def row_log_density(network: Network, data: Dataset) -> Floats:
 
 def _upwards(network: Network, data: Dataset) -> tuple[list[Message], Floats]:
     """Return the messages of all groups, and log P(row, S) (n, |S|)."""
-    messages = [
-        message_of(family, local_log_density(family, group, data.features))
-        for family, group in zip(network.families, data.groups, strict=True)
-    ]
     joint = bit_log_density(network.bits, data.bits) + log_(network.style)
-    for said in messages:
-        joint = joint + said.upwards
-    return messages, joint
+    product = np.ones(joint.shape)
+    messages = []
+    for family, group in zip(network.families, data.groups, strict=True):
+        local = local_log_density(family, group, data.features)
+        if family.direct:
+            joint += local
+            messages.append(Message(local[:, :0], local[:, :0]))
+        else:
+            messages.append(Message(*message(local, family.hidden, joint, product)))
+    return messages, joint + np.log(product)
 
 
 def _clusters(

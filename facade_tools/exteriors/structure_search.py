@@ -18,6 +18,7 @@ from . import em, mixture, styles
 from .coordinates import Floats
 from .dataset import Dataset, Scaling
 from .em import Prior, Stop, statistics
+from .kernels_conjugate import dirichlet_part
 from .lateral import Inputs, acyclic, admissible, crowded, parent_of
 from .layout import Layout
 from .mixture import Local, Task
@@ -130,20 +131,21 @@ class Search:
         total += table_part(rows.style_weight @ upper.posterior, upper.style, prior.style)
         counts = np.stack(styles.bit_counts(rows, upper.posterior), axis=-1)
         total += table_part(counts, np.stack([upper.bits, 1 - upper.bits], axis=-1), prior.bit)
-        at = 0
-        for g, size in enumerate(sizes):
-            part = slice(at, at + size)
-            total += table_part(upper.counts[:, part], upper.hidden[:, part], prior.hidden)
-            total += self.family(g, size, inputs[g])[1]
-            at += size
+        starts = np.cumsum([0, *sizes])
+        total += dirichlet_part(upper.counts, upper.hidden, starts, prior.hidden)
+        total += sum(self.family(g, size, inputs[g])[1] for g, size in enumerate(sizes))
         self.tried.append(Tried(len(upper.style), sizes, inputs, total))
         return total
 
     def state(
-        self, upper: Upper, sizes: tuple[int, ...], inputs: tuple[Inputs, ...], iterations: int
+        self,
+        upper: Upper,
+        shown: Evidence,
+        sizes: tuple[int, ...],
+        inputs: tuple[Inputs, ...],
+        iterations: int,
     ) -> State:
-        """Return the configuration after some EM of its upper half."""
-        shown = self.evidence(sizes, inputs)
+        """Return the configuration after some EM of its upper half; shown: its evidence."""
         better = styles.improve(self.rows, shown, upper, iterations)
         return State(better, sizes, inputs, self.score(better, sizes, inputs))
 
@@ -172,11 +174,12 @@ def start(search: Search, inputs: tuple[Inputs, ...]) -> State:
     if search.rng is not None:
         least = max(search.limits.least, 2)
         guess = search.rng.dirichlet(np.ones(least), len(search.data))
-        return search.state(styles.first(search.rows, shown, guess), sizes, inputs, 30)
+        upper = styles.first(search.rows, shown, guess)
+        return search.state(upper, shown, sizes, inputs, 30)
     upper = styles.first(search.rows, shown, np.ones((len(search.data), 1)))
     for _ in range(search.limits.least - 1):
         upper = styles.grow(search.rows, shown, upper)
-    return search.state(upper, sizes, inputs, 10)
+    return search.state(upper, shown, sizes, inputs, 10)
 
 
 def sweep(search: Search, state: State) -> Iterator[State]:
@@ -188,7 +191,7 @@ def sweep(search: Search, state: State) -> Iterator[State]:
             return
         shown = search.evidence(state.sizes, state.inputs)
         upper = styles.grow(search.rows, shown, state.upper)
-        state = search.state(upper, state.sizes, state.inputs, 10)
+        state = search.state(upper, shown, state.sizes, state.inputs, 10)
 
 
 def climb(search: Search, state: State) -> State:
@@ -223,7 +226,7 @@ def resized(search: Search, state: State, g: int, size: int, inputs: Inputs) -> 
     rest = state.upper.counts
     both = np.concatenate([rest[:, :at], counts, rest[:, at + state.sizes[g] :]], axis=1)
     upper = styles.maximise(search.rows, shown, state.upper.posterior, both)
-    return search.state(upper, sizes, all_inputs, 3)
+    return search.state(upper, shown, sizes, all_inputs, 3)
 
 
 # --- lateral edges ------------------------------------------------------------------------------
@@ -339,7 +342,7 @@ def refreshed(search: Search, state: State) -> State:
     hidden = np.concatenate([family.hidden for family in network.families], axis=1)
     shown = search.evidence(state.sizes, state.inputs)
     upper = styles.expect(search.rows, shown, network.style, network.bits, hidden)
-    return search.state(upper, state.sizes, state.inputs, 3)
+    return search.state(upper, shown, state.sizes, state.inputs, 3)
 
 
 def search_structure(search: Search) -> State:

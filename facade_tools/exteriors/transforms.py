@@ -56,6 +56,14 @@ TRANSFORMS: dict[str, Transform] = {
     ),
 }
 
+ENDS = {
+    name: (
+        transform.forward(np.array(transform.lowest)),
+        transform.forward(np.array(transform.highest)),
+    )
+    for name, transform in TRANSFORMS.items()
+}
+
 
 def forward(name: str, x: Floats) -> tuple[Floats, Floats]:
     """Return (t, log |dt/dx|) of coordinates in their own unit; what lies outside is clipped.
@@ -72,9 +80,8 @@ def forward(name: str, x: Floats) -> tuple[Floats, Floats]:
 
 def slope_at(name: str, t: Floats) -> Floats:
     """Return log |dt/dx| at points of the unbounded scale; at the nearest end where outside."""
-    transform = TRANSFORMS[name]
-    lowest, highest = (transform.forward(np.array(x)) for x in transform[3:])
-    return transform.log_slope(np.clip(t, lowest, highest))
+    lowest, highest = ENDS[name]
+    return TRANSFORMS[name].log_slope(np.minimum(np.maximum(t, lowest), highest))
 
 
 def inverse(name: str, t: Floats) -> Floats:

@@ -20,8 +20,8 @@ MAX_PIXELS = 60_000_000  # of all faces together
 AMPLE_PIXELS = 8_000_000  # of all faces together, for more than the source's resolution
 DEFAULT_DENSITY = 16.0  # pixels a metre where the source has no textures
 MAX_DENSITY = 256.0
-REACH = 0.06  # of the plan's size: how far off a face its texture may lie
-UPRIGHT, INCLINED = 0.5, 0.05  # share of a normal that points to the viewer: of walls, of the rest
+REACH, NICHE = 0.06, 1.2  # of the plan's size, and at least (m): how far off a face its texture lies
+UPRIGHT, INCLINED = 0.1, 0.05  # share of a normal that points to the viewer: of walls, of the rest
 
 # side -> axis along the wall, its direction from left to right, axis of the outward normal, sign
 SIDES = {
@@ -94,7 +94,7 @@ def face_pictures(mesh: TexturedMesh, faces: Sequence[WallFace], density: float)
     the walls, for faces that nothing covers.
     """
     extent = float(np.ptp(mesh.vertices[:, :2], axis=0).max())
-    reach = REACH * extent
+    reach = max(REACH * extent, min(NICHE, 0.5 * extent))
     upright, inclined = _shown(mesh, UPRIGHT), _shown(mesh, INCLINED)
     usual = _usual_colour(mesh)
     results = []

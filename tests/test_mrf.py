@@ -13,10 +13,15 @@ from facade_tools.artifacts.documents import decode, encode
 from facade_tools.artifacts.parse import LABELS
 from facade_tools.errors import Infeasible
 from facade_tools.imaging.image_io import Photo
-from facade_tools.reconstruction.evidence import agreement, profiles, window_evidence
+from facade_tools.reconstruction.evidence import (
+    agreement,
+    profiles,
+    repeated_columns,
+    window_evidence,
+)
 from facade_tools.reconstruction.lines import differences, earth_movers, segments
 from facade_tools.reconstruction.mrf import Scale, read_facade
-from facade_tools.reconstruction.storeys import period, skyline
+from facade_tools.reconstruction.storeys import Band, _kept, period, skyline
 
 WALL, GLASS, SKY, SHOP = (206, 190, 160), (50, 60, 74), (180, 205, 240), (90, 40, 36)
 FLOOR, STRIPE = 60, 70  # pixels
@@ -152,6 +157,31 @@ def test_profiles_are_those_of_a_product():
     assert np.allclose(rows[down == 0], 0)
     assert columns[across > 0].min() > columns[across == 0].max()
     assert (agreement(plane, columns, 1.0)[down > 0] > 0.4).all()
+
+
+def test_columns_repeat_with_storeys_a_drain_does_not():
+    plane = np.zeros((150, 60), np.float32)
+    for storey in range(5):
+        plane[30 * storey + 8 : 30 * storey + 22, 10:16] = 1.0
+        plane[30 * storey + 8 : 30 * storey + 22, 40:46] = 1.0
+    plane[:, 28] = 3.0
+    plane -= plane.mean(axis=1, keepdims=True)
+    columns = repeated_columns(plane, 30)
+    assert np.linalg.norm(columns) == pytest.approx(1)
+    assert columns[10:16].min() > 0.1
+    assert columns[28] < 0.5 * columns[10:16].min()
+    assert profiles(plane)[1][28] > columns[28]
+    assert len(repeated_columns(plane[:40], 30)) == 60  # lower than a storey and a half
+
+
+@pytest.mark.parametrize(
+    ("height", "columns", "kept"), [(10, 0.2, False), (10, 0.9, True), (20, 0.2, True)]
+)
+def test_a_cornice_under_the_sky_is_no_row_of_windows(height, columns, kept):
+    floors = [Band("floor", y, y + 30, y + 8, y + 24, 1.0, 0.4) for y in (90, 60, 30)]
+    roof = Band("roof", 30 - height, 30, 30 - height, 28, columns, 0.4)
+    last = _kept([*floors, roof])[-1]
+    assert (last.high > last.low) == kept
 
 
 def test_the_profiles_of_a_wide_and_a_high_plane_are_found_alike():

@@ -21,7 +21,7 @@ from facade_tools.geometry.roofs import union_patches
 from facade_tools.geometry.solids import Label, Solid, building_solid, footprint_solid, triangulated
 from facade_tools.geometry.solids_merge import Piece, merged
 from facade_tools.geometry.triangulate import triangulate_rings
-from facade_tools.geometry.triangulate_ears import clipped_ears
+from facade_tools.geometry.triangulate_ears import _bridge, _joined, clipped_ears
 
 HOUSES = Path(__file__).resolve().parent.parent / "sample_data" / "houses"
 BUILDINGS = catalogue.buildings()
@@ -208,6 +208,36 @@ def test_triangles_cover_the_polygon_and_pair(kind: str) -> None:
         order = oriented(rings)
         ends = np.cumsum([len(ring) for ring in rings])
         check_triangles(order, clipped_ears(np.concatenate(order), ends))
+
+
+def joined_by_trying_all(points: np.ndarray, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """The ring of `_joined`: every hole's shortest bridge is sought again after every hole."""
+    ring = np.arange(ends[0])
+    holes = list(range(1, len(ends)))
+    while holes:
+        bridges = [_bridge(points, ring, hole, starts, ends) for hole in holes]
+        best = int(np.argmin([length for length, _, _ in bridges]))
+        _, i, j = bridges[best]
+        hole = np.roll(np.arange(starts[holes[best]], ends[holes[best]]), -j)
+        holes.pop(best)
+        ring = np.concatenate([ring[: i + 1], hole, hole[:1], ring[i:]])
+    return ring
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_holes_are_joined_by_the_bridges_that_trying_all_finds(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    columns, rows = rng.integers(2, 6, 2)
+    rings = [np.array([[0, 0], [3 * columns, 0], [3 * columns, 3 * rows], [0, 3 * rows]], float)]
+    for x, y in np.ndindex(columns, rows):
+        hole = np.array([[1, 1], [1, 2], [2, 2], [2, 1]]) + np.array([3 * x, 3 * y])
+        rings.append(hole + (seed % 3) * 0.25 * rng.uniform(-1, 1, hole.shape))
+    points = np.concatenate(rings)
+    ends = np.cumsum([len(ring) for ring in rings])
+    starts = np.concatenate([[0], ends[:-1]])
+    ring = _joined(points, starts, ends)
+    assert (ring == joined_by_trying_all(points, starts, ends)).all()
+    check_triangles(rings, clipped_ears(points, ends))
 
 
 def check_triangles(rings: list[np.ndarray], triangles: np.ndarray) -> None:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import eigh
 
 from ..imaging.image_io import Picture
 
@@ -124,15 +125,44 @@ def profiles(plane: Plane) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     sun and a neighbour's edge no more than a window. The rows' profile is a correlation, −1..1;
     the columns' has length 1; both are positive at windows.
     """
-    table = plane.astype(np.float64)
-    rows = table / (_lengths(table, 1, 0.5) + 1e-9)
-    rows = rows / (_lengths(rows, 0, 0.3) + 1e-9)
+    rows = _balanced(plane)
     across = _leading(rows)
     for _ in range(ROUNDS):  # a row cannot hold the opposite of windows
         down = np.maximum(rows @ across, 0.0)
         across = down @ rows
         across /= np.linalg.norm(across) + 1e-12
     return rows @ across, across
+
+
+def repeated_columns(plane: Plane, storey: int) -> NDArray[np.float64]:
+    """Return the profile of columns that comes again a storey above, and not half a storey above.
+
+    storey: rows of the plane. So a drain, a pilaster or a neighbour's wall is no column of
+    windows. Has length 1 and is positive at windows. A plane of hardly more than a storey
+    repeats nothing; its leading profile is returned.
+    """
+    rows = _balanced(plane)
+    n, half = len(rows), storey // 2
+    if half < 1 or n < storey + half:
+        return _leading(rows)
+    calm = cv2.GaussianBlur(rows, (0, 0), sigmaX=0.6, sigmaY=0.1 * storey).astype(np.float64)
+    alike = rows.T @ rows / n + _apart(calm, storey) - _apart(calm, half)
+    last = [len(alike) - 1] * 2
+    across: NDArray[np.float64] = eigh(alike, subset_by_index=last)[1][:, 0]
+    return across if (rows @ across).sum() >= 0 else -across
+
+
+def _apart(rows: NDArray[np.float64], lag: int) -> NDArray[np.float64]:
+    """Return the mean product of columns in rows that lie `lag` apart, symmetric."""
+    products = rows[:-lag].T @ rows[lag:] / (len(rows) - lag)
+    return np.asarray((products + products.T) / 2)
+
+
+def _balanced(plane: Plane) -> NDArray[np.float64]:
+    """Return the plane, its rows and then its columns scaled to about equal length."""
+    table = plane.astype(np.float64)
+    rows = table / (_lengths(table, 1, 0.5) + 1e-9)
+    return np.asarray(rows / (_lengths(rows, 0, 0.3) + 1e-9))
 
 
 def _lengths(table: NDArray[np.float64], axis: int, floor: float) -> NDArray[np.float64]:

@@ -100,15 +100,16 @@ def in_cells(photo: Photo, scale: Scale, mask: NDArray[np.bool_] | None = None) 
     rows = agreement(evidence.plane, profiles(evidence.plane)[1], 3.0, 0.5)
     sky = skyline(differences(found, reach), rows)
     colour = differences(found, reach, sky)
-    cell = _cell(scale, rows[sky:], height - sky)
-    return _facade(working, evidence, colour, sky, cell)
+    storey = period(rows[sky:])
+    cell = _cell(scale, storey, height - sky)
+    return _facade(working, evidence, colour, sky, cell, storey)
 
 
-def _cell(scale: Scale, rows: NDArray[np.float64], height: int) -> float:
+def _cell(scale: Scale, storey: float, height: int) -> float:
     """Return the working pixels of a cell."""
     if scale.height is not None:
         return height * CELL / scale.height
-    return period(rows) * CELL / (scale.storey or STOREY)
+    return storey * CELL / (scale.storey or STOREY)
 
 
 def _facade(
@@ -117,6 +118,7 @@ def _facade(
     colour: NDArray[np.float64],
     sky: int,
     cell: float,
+    storey: float,
 ) -> Facade:
     height, width = working.shape[:2]
     cell = max(cell, height / MOST, width / MOST)
@@ -125,7 +127,7 @@ def _facade(
     picture = cv2.resize(working, (m, n), interpolation=cv2.INTER_AREA).astype(np.float64) / 255
     plane = cv2.resize(evidence.plane, (m, n), interpolation=cv2.INTER_AREA).astype(np.float32)
     lines = np.interp(np.arange(n + 1) * height / n, np.arange(height + 1), colour)
-    return Facade(picture, plane, lines, round(sky * n / height))
+    return Facade(picture, plane, lines, round(sky * n / height), round(storey * n / height))
 
 
 def _shrunk(mask: NDArray[np.bool_] | None, shape: tuple[int, ...]) -> NDArray[np.bool_] | None:

@@ -109,13 +109,15 @@ def skyline(differences: Floats, rows: Floats) -> int:
 class Facade:
     """A picture in cells: colours 0..1 (n, m, 3), evidence (n, m), and what was found of it.
 
-    differences: of colour across the rows (n+1,). sky: rows of sky.
+    differences: of colour across the rows (n+1,). sky: rows of sky. storey: rows after which
+    windows repeat.
     """
 
     picture: Floats
     plane: NDArray[np.float32]
     differences: Floats
     sky: int
+    storey: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,6 +235,9 @@ def _bands(
 # roof: of its evidence) and of its height.
 LEAST_SCORE = {"ground": 0.7, "floor": 0.15, "roof": 0.2}
 LEAST_HEIGHT = {"ground": 0.5, "floor": 0.25, "roof": 0.2}
+# A roof lower than this share of a storey is a cornice or a balustrade, unless what it shows
+# stands in the columns below as much as this share of the median floor's windows.
+LOW_ROOF, IN_COLUMNS = 0.45, 0.6
 
 
 def _kept(bands: list[Band]) -> list[Band]:
@@ -242,11 +247,15 @@ def _kept(bands: list[Band]) -> list[Band]:
         return bands
     usual = {kind: float(np.median([_score(b, kind) for b in floors])) for kind in LEAST_SCORE}
     height = float(np.median([band.high - band.low for band in floors]))
+    low_roof = LOW_ROOF * float(np.median([band.y1 - band.y0 for band in floors]))
     out = []
     for band in bands:
         kind = band.kind
         enough = _score(band, kind) >= LEAST_SCORE[kind] * usual[kind]
         high = band.high - band.low >= LEAST_HEIGHT[kind] * height
+        cornice = kind == "roof" and band.y1 - band.y0 < low_roof
+        if cornice and band.columns < IN_COLUMNS * usual["floor"]:
+            enough = False
         out.append(band if enough and high else replace(band, low=band.y1, high=band.y1))
     return out
 

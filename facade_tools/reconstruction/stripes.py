@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..errors import Infeasible
 from ..geometry.arrays import Floats
 from .chains import Chain, ChainProblem, solve
-from .evidence import along_columns, profiles
+from .evidence import along_columns, repeated_columns
 from .potentials import (
     Weights,
     boundary_costs,
@@ -41,7 +41,7 @@ def stripes(facade: Facade, *, gaps: bool = True) -> Chain:
     gaps: with the term of walls between windows (homogeneous and symmetric); it can be switched
     off. A facade without any has an empty chain.
     """
-    across = profiles(facade.plane[facade.sky :])[1]
+    across = repeated_columns(facade.plane[facade.sky :], facade.storey)
     evidence = across / (np.percentile(across, 95) + 1e-9)
     return _chain(facade.picture[facade.sky :], evidence - EDGE, gaps=gaps)
 

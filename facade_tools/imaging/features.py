@@ -7,6 +7,7 @@ so that a classifier's thresholds mean the same in every picture.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import TypeVar
 
 import cv2
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 Picture = NDArray[np.uint8]  # (height, width, 3) RGB
 Plane = NDArray[np.float32]  # (height, width), values meant for 0..255
 Features = NDArray[np.uint8]  # (count, height, width)
+Value = TypeVar("Value", np.float32, np.uint8)
 
 BLURS = (1.0, 2.0, 4.0, 8.0)  # pixels
 TEXTURE_WINDOWS = (5, 11, 23)  # pixels
@@ -32,10 +34,13 @@ def pixel_features(picture: Picture) -> Features:
     return stacked(list(_planes(picture)))
 
 
-def stacked(planes: Sequence[Plane]) -> Features:
-    """Return planes clipped to bytes and stacked, (count, height, width)."""
-    out = np.empty((len(planes), *planes[0].shape), np.uint8)
+def stacked(planes: Sequence[Plane | Features], into: Features | None = None) -> Features:
+    """Return planes clipped to bytes and stacked, (count, height, width), in `into` if given."""
+    out = np.empty((len(planes), *planes[0].shape), np.uint8) if into is None else into
     for row, plane in zip(out, planes, strict=True):
+        if plane.dtype == np.uint8:
+            row[:] = plane
+            continue
         np.clip(plane, 0.0, 255.0, out=row, casting="unsafe")
     return out
 
@@ -129,11 +134,11 @@ def boxed(plane: Plane, size: tuple[int, int]) -> Plane:
     return cv2.blur(plane, size).astype(np.float32, copy=False)
 
 
-def shifted(plane: Plane, dx: int, dy: int) -> Plane:
+def shifted(plane: NDArray[Value], dx: int, dy: int) -> NDArray[Value]:
     """Return the plane whose pixel (x, y) is the given one's (x + dx, y + dy); edges repeat."""
     height, width = plane.shape
     edges = (max(-dy, 0), max(dy, 0), max(-dx, 0), max(dx, 0))
     wider = cv2.copyMakeBorder(np.ascontiguousarray(plane), *edges, cv2.BORDER_REPLICATE)
     top, left = max(dy, 0), max(dx, 0)
     moved = wider[top : top + height, left : left + width]
-    return moved.astype(np.float32, copy=False)
+    return moved.astype(plane.dtype, copy=False)

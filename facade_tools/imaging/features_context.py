@@ -29,9 +29,16 @@ def context_features(probabilities: Probabilities) -> Features:
     >>> context_features(np.full((2, 4, 6), 0.5, np.float32)).shape[1:]
     (4, 6)
     """
-    # class by class: the planes of one are in memory as floats at a time
-    parts = [stacked([GAIN * plane for plane in _planes(one)]) for one in probabilities]
-    return np.concatenate(parts)
+    out: Features | None = None
+    for k, one in enumerate(probabilities):
+        # class by class: the planes of one are in memory as floats at a time
+        planes: list[Plane | Features] = [GAIN * plane for plane in _planes(one)]
+        planes += _neighbours(one)
+        if out is None:
+            out = np.empty((len(probabilities), len(planes), *one.shape), np.uint8)
+        stacked(planes, out[k])
+    assert out is not None
+    return out.reshape(-1, *out.shape[2:])
 
 
 def belief_features(probabilities: Probabilities) -> Features:
@@ -76,7 +83,11 @@ def _planes(one: Plane) -> Iterator[Plane]:
         yield boxed(one, (3, run))
     yield from _lines(one)
     yield from _sides(one)
-    smooth = boxed(one, (3, 3))
+
+
+def _neighbours(one: Plane) -> Iterator[Features]:
+    """Yield planes of bytes: they are moved as such, a quarter of the memory."""
+    smooth = stacked([GAIN * boxed(one, (3, 3))])[0]
     for step in STEPS:
         for dx, dy in ((step, 0), (-step, 0), (0, step), (0, -step)):
             yield shifted(smooth, dx, dy)

@@ -29,18 +29,19 @@ BLOCK = 20_000  # pixels whose codes are in memory at once
 class Planes:
     """All that a last stage sees of a picture.
 
-    coarse: planes of the coarse picture, if any. fine: planes of the picture. belief: of the
-    stages before; None where there are none.
+    coarse: planes of the coarse picture, if any. fine: planes of the picture, in parts: together
+    they would only be copied. belief: of the stages before; None where there are none.
     """
 
     coarse: Features | None
-    fine: Features
+    fine: tuple[Features, ...]
     belief: Probabilities | None
 
     @property
     def shape(self) -> tuple[int, int]:
         """Height and width of the picture."""
-        return self.fine.shape[1], self.fine.shape[2]
+        height, width = self.fine[0].shape[1:]
+        return height, width
 
     def doubtful(self) -> NDArray[np.bool_]:
         """Return where the stage is asked, (height, width)."""
@@ -53,7 +54,7 @@ class Planes:
         """Return the features of pixels given by flat indices, (pixels, features)."""
         height, width = self.shape
         y, x = np.divmod(at, width)
-        parts = [self.fine[:, y, x]]
+        parts = [part[:, y, x] for part in self.fine]
         if self.coarse is not None:
             rows = (2 * y + 1) * self.coarse.shape[1] // (2 * height)
             columns = (2 * x + 1) * self.coarse.shape[2] // (2 * width)
@@ -68,18 +69,18 @@ def planes_of(edges: Features, coarse: Picture, before: Probabilities | None) ->
     """
     low = pixel_features(coarse)
     if before is None:
-        return Planes(low, edges, None)
+        return Planes(low, (edges,), None)
     shape = edges.shape[1], edges.shape[2]
     belief = enlarged(before, shape)
     means = [belief_features(enlarged(one, shape)) for one in repeated(before)]
-    fine = np.concatenate([edges, belief_features(belief), *means])
+    fine = (edges, belief_features(belief), *means)
     return Planes(np.concatenate([low, context_features(before)]), fine, belief)
 
 
 def planes_again(edges: Features, belief: Probabilities) -> Planes:
     """Return what the second last stage sees: the belief of the first about the picture too."""
     means = [belief_features(one) for one in repeated(belief)]
-    return Planes(None, np.concatenate([edges, context_features(belief), *means]), belief)
+    return Planes(None, (edges, context_features(belief), *means), belief)
 
 
 def finished(trees: Trees, planes: Planes) -> Probabilities:

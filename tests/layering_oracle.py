@@ -15,6 +15,7 @@ import numpy as np
 from layering_walk import SYMBOLS, simplex, walk
 
 TOLERANCES = (0.02, 0.05, 0.1, 0.2, 0.4)
+SHARES = (0.0, 1 / 16, 1 / 4, 1 / 2, 3 / 4, 1.0)  # of µ: what is found first is least
 MOST_PARTITIONS = 300_000
 MOST_STEPS = 200_000_000
 MOST_PROGRAMMES = 20_000
@@ -150,7 +151,7 @@ def described(direction, word, cells, most, symbols):
     )
 
 
-def partitions(direction, words, split, mu, most):
+def partitions(direction, words, split, mu, most, patience=1):
     """Return (Ω at least, pieces, −columns, columns of cells) of all that may count.
 
     most: greatest Ω that known sizes may ask for.
@@ -163,10 +164,10 @@ def partitions(direction, words, split, mu, most):
     slack = 1e-9 * direction.canvas
     m = len(words)
     assert table.shape[1] == SYMBOLS + len(symbols)
-    for rows in (1_000, 16_000, MOST_PARTITIONS):
+    for rows in (1_000, 16_000, patience * MOST_PARTITIONS):
         found, columns, omega, pieces, all_ = walk(
             table, begin, ends, rest, m, len(symbols), least, most + slack,
-            direction.canvas + mu + slack, rows, MOST_STEPS,
+            direction.canvas + mu + slack, rows, patience * MOST_STEPS,
         )  # fmt: skip
         if all_:
             break
@@ -295,10 +296,11 @@ def sizable(direction, words, columns):
     return least_cost(np.zeros(len(place)), [], equal, least)[0] == 0
 
 
-def best(direction, words_of_layers):
+def best(direction, words_of_layers, patience=1):
     """(µ/canvas, Ω, pieces, columns, |Σ − canvas|) of the contract's answer, or None.
 
-    words_of_layers: all words of every layer, topmost first.
+    words_of_layers: all words of every layer, topmost first. patience: how many times more than
+    the tests have time for. Raises TooLarge.
     """
     for share in TOLERANCES:
         mu = share * direction.canvas
@@ -306,27 +308,28 @@ def best(direction, words_of_layers):
             words for words in itertools.product(*words_of_layers) if admitted(direction, words, mu)
         ]
         for split in (False, True):
-            for most in (0.0, mu / 16, mu / 4, mu):  # Ω from below: what is found first is least
-                found = best_within(direction, candidates, split, mu, most)
+            for part in SHARES:
+                found = best_within(direction, candidates, split, mu, part * mu, patience)
                 if found is not None:
                     return (share, *found)
     return None
 
 
-def best_within(direction, candidates, split, mu, most):
+def best_within(direction, candidates, split, mu, most, patience):
     """(Ω, pieces, columns, |Σ − canvas|) of the best sizable partition with Ω ≤ most, or None.
 
     Partitions come by what they are at best; those that cannot go before what is known are left.
     """
     rows = []
     for words in candidates:
-        for floor, pieces, columns, cells in partitions(direction, words, split, mu, most):
+        found = partitions(direction, words, split, mu, most, patience)
+        for floor, pieces, columns, cells in found:
             rows.append(((floor, pieces, columns), words, cells))
     winner = None
     for number, (floor, words, cells) in enumerate(sorted(rows, key=lambda row: row[0])):
         if winner is not None and floor > winner[:3]:
             break
-        if number > MOST_PROGRAMMES:
+        if number > patience * MOST_PROGRAMMES:
             raise TooLarge
         value = error(direction, words, cells, mu)
         if value is None or value[0] > most + 1e-9 * direction.canvas:

@@ -16,12 +16,13 @@ from layering_oracle import TooLarge, best, least_cost
 from scipy.optimize import linprog
 
 from facade_tools.errors import Infeasible, InvalidInput
-from facade_tools.layering.alignment import full_key, prepare
+from facade_tools.layering.alignment import prepare
 from facade_tools.layering.evaluation import evaluate
 from facade_tools.layering.language import PatternError, Substituted, parse, symbol_pair
 from facade_tools.layering.problem import Candidate, Direction, LayerPattern, Rule, Span
 from facade_tools.layering.search import Clock, GroupSearch
 from facade_tools.layering.solve import solve_direction
+from facade_tools.layering.tasks import full_key
 from facade_tools.layering.words import Expansion, Letter, expand, reflected
 
 SIZES = dict.fromkeys("ABCcexyz", 1.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import heapq
 import time
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import count, pairwise
 from typing import Any
@@ -14,57 +14,26 @@ import numpy as np
 
 from . import kernels, kernels_labels
 from .bounds import PairBounds
-from .candidates import Bounds
 from .evaluation import Borders, Line, crossings, evaluate, least_error
+from .kernels_columns import row_hash
 from .lattice import Lattice, chain
 from .paths import Path, decoded, joined_borders
 from .problem import SLACK, Alignment, Candidate, Direction, Rule
+from .race import Race
 from .rows import Integers, RowMaker, Rows, TooLarge
 from .sizing import conflict
+from .tasks import Found, Key, Task, full_key, key_of
+from .walk import Walk, walk_of
 from .words import Letter, Word
 
 Box = Mapping[str, tuple[float, float]]
-Key = tuple[float, int, int, float, tuple[Any, ...]]
 
-MANY_LAYERS = 5  # more than these are searched with equal words as one row
+MANY_LAYERS = 5  # more than these are searched apart only where it is soon done
+FEW_LABELS = 32_000
+FEW_STEPS = 2_400_000
 FIRST_LABELS = 4_000
 FIRST_STEPS = 300_000
 GROWTH = 8
-MOST_LABELS = 500_000
-MOST_STEPS = 60_000_000
-MOST_NODES = 30_000
-
-
-@dataclass(frozen=True, slots=True)
-class Effort:
-    """Bounds on one search: labels kept, rows tried, nodes branched; `beam` 0 for none."""
-
-    labels: int = MOST_LABELS
-    steps: int = MOST_STEPS
-    nodes: int = MOST_NODES
-    beam: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class Task:
-    """One candidate at one tolerance (a share of the canvas) with a budget of Ω (m)."""
-
-    candidate: Candidate
-    bounds: tuple[Bounds, ...]
-    tolerance: float
-    budget: float
-    splits: bool = False
-    effort: Effort = field(default_factory=Effort)
-    rival: Alignment | None = None  # only what may go before it is wanted
-
-
-@dataclass(frozen=True, slots=True)
-class Found:
-    """The best alignment of a task, or none; `complete` unless a bound cut the search short."""
-
-    alignment: Alignment | None
-    complete: bool
-    bound: float = 0.0  # no alignment that was left out has a smaller Ω (m)
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,35 +49,12 @@ class _Node:
         return tuple(sorted(self.box.items())), tuple(map(frozenset, self.forbidden)), self.leaf
 
 
-def key_of(alignment: Alignment, canvas: float) -> Key:
-    """Return what alignments are ordered by: Ω, pieces, columns, |Σ − canvas|, names."""
-    step = SLACK * canvas
-    return (
-        round(alignment.omega / step) * step,
-        alignment.pieces,
-        -alignment.count,
-        round(abs(alignment.sigma - canvas) / step) * step,
-        (),
-    )
+Entry = tuple[Key, int, Alignment, _Node | None]  # of a queue; without a node: exact
 
 
-def names_of(alignment: Alignment) -> tuple[Any, ...]:
-    """Return words and columns as names, for the last tie."""
-    words = alignment.candidate.words
-    named = tuple(tuple(letter.name for letter in word) for word in words)
-    columns = tuple(
-        tuple(
-            tuple(a.name for a in alignment.column(row, column))
-            for column in range(alignment.count)
-        )
-        for row in range(len(words))
-    )
-    return named, columns
-
-
-def full_key(alignment: Alignment, canvas: float) -> Key:
-    """Return the whole order, names included."""
-    return (*key_of(alignment, canvas)[:4], names_of(alignment))
+def _exact(queue: list[Entry]) -> Alignment | None:
+    """Return the best of the exact alignments in a queue."""
+    return min((entry[:3] for entry in queue if entry[3] is None), default=(None,))[-1]
 
 
 @cache
@@ -121,7 +67,10 @@ def prepare() -> None:
     candidate = Candidate(words, parts=(2,), lattices=tuple(map(chain, words)))
     aligner = Aligner(direction)
     aligner.pairs.exceed(candidate, 0.4, True, 1.0)
-    aligner.best(Task(candidate, (), 0.4, 1.0, splits=True))
+    task = Task(candidate, (), 0.4, 1.0, splits=True)
+    aligner.best(task)
+    if (walk := aligner.walk(task)) is not None:
+        walk.go(1)
 
 
 class Aligner:
@@ -136,7 +85,7 @@ class Aligner:
         """Align; `late(s)` tells whether the time will be up in s seconds by the clock `now`."""
         self.direction, self.late, self.now = direction, late, now
         self.maker = RowMaker(direction)
-        self.pairs = PairBounds(direction, self.maker)
+        self.pairs = PairBounds(direction, self.maker, late)
         self._known: dict[tuple[tuple[Lattice, ...], str], list[float]] = {}
 
     def best(self, task: Task) -> Found:
@@ -144,17 +93,21 @@ class Aligner:
         box = {name: (low, high) for name, low, high in task.candidate.unsized}
         root = _Node(box, ((),) * len(task.candidate.parts))
         order = count()
+        race = Race(self.direction, task, lambda: self.walk(task), self.late, self.now)
         seen = {root.signature}
-        queue: list[tuple[Key, int, Alignment, _Node | None]] = []
+        queue: list[Entry] = []
         complete = self._push(queue, order, root, task)
         for _ in range(task.effort.nodes):
-            if not queue:
-                return Found(None, complete, task.budget)
+            node = queue[0][3] if queue else None
+            if node is None and complete:
+                best = _exact(queue)
+                return Found(best, True, task.budget if best is None else best.omega)
             if self.late(0.0):
                 break
-            _, _, path, node = heapq.heappop(queue)
-            if node is None:
-                return Found(path, complete, path.omega)
+            proved = race.turn(_exact(queue), alone=node is None)
+            if proved is not None or node is None:
+                return proved or self._cut(queue, race)
+            path = heapq.heappop(queue)[2]
             exact, children = self._examine(path, node, task)
             if exact is not None and exact.omega <= self._most(task):
                 key = full_key(exact, self.direction.canvas)
@@ -163,7 +116,24 @@ class Aligner:
                 if child.signature not in seen:
                     seen.add(child.signature)
                     complete &= self._push(queue, order, child, task)
-        return self._cut(queue)
+        return self._cut(queue, race)
+
+    def walk(self, task: Task) -> Walk | None:
+        """Return a walk over all alignments of a task, or None where it would be too long."""
+        candidate = task.candidate
+        if len(candidate.parts) > 1 or task.effort.beam:
+            return None
+        box = {name: (low, high) for name, low, high in candidate.unsized}
+        try:
+            rows = self.maker.rows(candidate.lattices, box, False, task.splits)
+        except TooLarge:
+            return None
+        limits = self._limits(task, False, 0.0, bool(box))
+        guide = self.pairs.guide(rows.lattices, box, task.tolerance, task.splits)
+        walk = walk_of(self.maker, candidate, task.bounds, rows, limits, guide)
+        if walk is not None and task.rival is not None:
+            walk.know(task.rival)
+        return walk
 
     def _leaf_key(self, task: Task, node: _Node, key: Key) -> Key:
         """Return a lower bound for the sizes inside a range at whose ends the search was exact.
@@ -179,11 +149,9 @@ class Aligner:
         most = (float("inf"), *key[1:])
         return most if path is None else (key_of(path, self.direction.canvas)[0], *key[1:])
 
-    def _cut(self, queue: list[tuple[Key, int, Alignment, _Node | None]]) -> Found:
+    def _cut(self, queue: list[Entry], race: Race) -> Found:
         """Return the best of what is known when a search is cut short."""
-        known = [entry for entry in queue if entry[3] is None]
-        best = min(known)[2] if known else None
-        return Found(best, False, queue[0][0][0] if queue else 0.0)
+        return Found(race.best(_exact(queue)), False, queue[0][0][0] if queue else 0.0)
 
     def _most(self, task: Task) -> float:
         canvas = self.direction.canvas
@@ -238,11 +206,13 @@ class Aligner:
             path, complete = self._run(merged, task, loose, node.forbidden[part], ease > 0.0)
             if path is None or self._covered(path.words, path.borders):
                 return path, complete
+        rows = self.maker.rows(lattices, node.box, False, task.splits)
         if len(lattices) <= MANY_LAYERS:
-            rows = self.maker.rows(lattices, node.box, False, task.splits)
             return self._run(rows, task, strict, node.forbidden[part], ease > 0.0)
         path, _ = self._run(merged, task, strict, node.forbidden[part], ease > 0.0)
-        return path, False
+        light = replace(task, effort=replace(task.effort, labels=FEW_LABELS, steps=FEW_STEPS))
+        own, whole = self._run(rows, light, strict, node.forbidden[part], ease > 0.0)
+        return (own, True) if whole else (path, False)
 
     @staticmethod
     def _fills(rows: Rows, limits: Integers) -> bool:
@@ -407,5 +377,5 @@ class Aligner:
             if a != b or a.inside:
                 keys = (self.maker.place_key(word, x.letters, x.inside) for x in (a, b))
                 before, after = map(np.uint64, keys)
-                total += int(kernels.row_hash(row, before, after, int(a.inside) + int(b.inside)))
+                total += int(row_hash(row, before, after, int(a.inside) + int(b.inside)))
         return total & (2**64 - 1)

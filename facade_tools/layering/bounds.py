@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from math import prod
@@ -58,8 +58,14 @@ class PairBounds:
     are soon found, and most candidates have some pair of layers that others have, too.
     """
 
-    def __init__(self, direction: Direction, maker: RowMaker) -> None:
-        self.direction, self.maker = direction, maker
+    def __init__(
+        self,
+        direction: Direction,
+        maker: RowMaker,
+        late: Callable[[float], bool] = lambda _: False,
+    ) -> None:
+        """Bound; `late(s)` tells whether the time will be up in s seconds: then nothing is."""
+        self.direction, self.maker, self.late = direction, maker, late
         self._known: dict[object, _Pair] = {}
         self._held: dict[Lattice, None] = {}
         self._edges = 0  # of the lattices held
@@ -76,8 +82,11 @@ class PairBounds:
                 self._dear(self._pair(pair, box, tolerance, splits), most, widest) for pair in pairs
             ):
                 return True
-            if any(self._floor(pair, box, tolerance, splits, most) > most for pair in pairs):
-                return True
+            for pair in pairs:
+                if self.late(0.0):
+                    return False
+                if self._floor(pair, box, tolerance, splits, most) > most:
+                    return True
         return False
 
     def _limits(self, tolerance: float) -> tuple[int, int]:
@@ -202,7 +211,8 @@ class PairBounds:
             if status[kernels_labels.COMPLETE]:
                 found = status[kernels_labels.BEST] >= 0
                 return int(status[kernels_labels.REACHED]) if found else most + 1
-            if labels >= PAIR_LABELS or status[kernels_labels.STEPS] > PAIR_STEPS:
+            many = labels >= PAIR_LABELS or status[kernels_labels.STEPS] > PAIR_STEPS
+            if many or self.late(0.0):
                 return None
             labels *= 8
 

@@ -182,9 +182,13 @@ class Generator:
 
     def _lists(self, counters: Mapping[str, int]) -> list[list[Lattice]]:
         families = [self.rows_of(layer, counters) for layer in range(len(self.rows))]
-        if self._together(families):
-            return [[one.whole] if one.mixed else one.classes for one in families]
-        return [one.classes for one in families]
+        together = self._together(families)
+        out: list[list[Lattice]] = []
+        for one in families:
+            if self._stopped():
+                return [[]]
+            out.append([one.whole] if together and one.mixed else one.classes)
+        return out
 
     def _together(self, families: Sequence[Family]) -> bool:
         """Tell whether one search for all multisets of letters pays, and is possible.

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 from .candidates import Generator
 from .language import symbols_of
@@ -28,12 +29,20 @@ def explanation(
             f"{where}: no layout found; not proved that there is none: a pattern has more than "
             f"{MAX_WORDS} words that may fit, or words of more than {MAX_LETTERS} letters"
         )
-    group = next((g for g in groups if _hopeless(direction, g, _deadline(seconds / 4))), None)
+    alone = (g for g in groups if _hopeless(direction, g, _deadline(seconds / 4)))
+    group = groups[0] if len(groups) == 1 else next(alone, None)
     if group is None:
         names = " and ".join(groups)
         return f"{where}: groups {names} share counters or sizes that do not fit them all"
-    conflict = _Shrinker(direction, group, _deadline(seconds)).run()
-    return f"{where}: {_worded(direction, conflict)}"
+    return f"{where}: {_worded(direction, conflict_of(direction, group, seconds))}"
+
+
+def conflict_of(direction: Direction, group: str, seconds: float) -> Conflict:
+    """Return what rules out every layout of a group; nothing of it can be left out.
+
+    What the seconds do not suffice for is kept in it.
+    """
+    return _Shrinker(direction, group, _deadline(seconds)).run()
 
 
 def _deadline(seconds: float) -> float:
@@ -47,7 +56,7 @@ def _hopeless(direction: Direction, group: str, until: float) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
-class _Conflict:
+class Conflict:
     """Layers that have no layout together, and the qualifiers (symbol, name) that matter."""
 
     rows: tuple[LayerPattern, ...]
@@ -55,48 +64,53 @@ class _Conflict:
 
 
 class _Shrinker:
-    """Leaves out layers, then qualifiers, as long as what is left still has no layout."""
+    """Leaves out layers and qualifiers, as long as what is left still has no layout.
+
+    A layer less can be a layout less, too: it may have covered what the others do not. So the
+    attempts are gone through again until none of them succeeds.
+    """
 
     def __init__(self, direction: Direction, group: str, until: float) -> None:
         self.direction, self.group, self.until = direction, group, until
 
-    def run(self) -> _Conflict:
-        rows = self._layers(self.direction.groups[self.group])
-        return _Conflict(rows, tuple(self._qualifiers(rows)))
-
-    def _still(self, direction: Direction, rows: Sequence[LayerPattern]) -> bool:
-        """Tell whether these layers are known to have no layout."""
-        if time.monotonic() > self.until:
-            return False
-        return _hopeless(
-            replace(direction, groups={self.group: tuple(rows)}), self.group, self.until
-        )
-
-    def _layers(self, rows: tuple[LayerPattern, ...]) -> tuple[LayerPattern, ...]:
-        for row in rows:
-            fewer = tuple(other for other in rows if other is not row)
-            if fewer and self._still(self.direction, fewer):
-                rows = fewer
-        return rows
-
-    def _qualifiers(self, rows: Sequence[LayerPattern]) -> Iterable[tuple[str, str]]:
-        used = sorted(set[str]().union(*(symbols_of(row.node) for row in rows)))
+    def run(self) -> Conflict:
         direction = self.direction
-        for symbol in used:
-            for name in QUALIFIERS:
-                rule = direction.rules[symbol]
-                plain = name == "opaque"
-                if getattr(rule, name) == plain:
-                    continue
-                free = replace(rule, **{name: plain})
-                without = replace(direction, rules={**direction.rules, symbol: free})
-                if self._still(without, rows):
-                    direction = without
-                else:
-                    yield symbol, name
+        smaller: Direction | None = direction
+        while smaller is not None:
+            direction = smaller
+            tries = chain(self._fewer(direction), self._freer(direction))
+            smaller = next((one for one in tries if self._still(one)), None)
+        rows = direction.groups[self.group]
+        return Conflict(rows, tuple(_qualifiers(direction, rows)))
+
+    def _still(self, direction: Direction) -> bool:
+        """Tell whether something is known to have no layout."""
+        late = time.monotonic() > self.until
+        return not late and _hopeless(direction, self.group, self.until)
+
+    def _fewer(self, direction: Direction) -> Iterator[Direction]:
+        """Yield the problem without one of its layers."""
+        rows = direction.groups[self.group]
+        for row in rows if len(rows) > 1 else ():
+            fewer = tuple(other for other in rows if other is not row)
+            yield replace(direction, groups={self.group: fewer})
+
+    def _freer(self, direction: Direction) -> Iterator[Direction]:
+        """Yield the problem without one of its qualifiers."""
+        for symbol, name in _qualifiers(direction, direction.groups[self.group]):
+            free = replace(direction.rules[symbol], **{name: name == "opaque"})
+            yield replace(direction, rules={**direction.rules, symbol: free})
 
 
-def _worded(direction: Direction, conflict: _Conflict) -> str:
+def _qualifiers(direction: Direction, rows: Sequence[LayerPattern]) -> Iterator[tuple[str, str]]:
+    """Yield (symbol, name) of the qualifiers of some layers' symbols."""
+    for symbol in sorted(set[str]().union(*(symbols_of(row.node) for row in rows))):
+        for name in QUALIFIERS:
+            if getattr(direction.rules[symbol], name) != (name == "opaque"):
+                yield symbol, name
+
+
+def _worded(direction: Direction, conflict: Conflict) -> str:
     single = direction.groups and len(conflict.rows) == 1
     if single:
         return _alone(direction, conflict)
@@ -111,7 +125,7 @@ def _mark(mark: tuple[str, str]) -> str:
     return f"symbol {symbol!r} {'not opaque' if name == 'opaque' else name}"
 
 
-def _alone(direction: Direction, conflict: _Conflict) -> str:
+def _alone(direction: Direction, conflict: Conflict) -> str:
     """Explain a single layer: its words are too long or too short, or do not cover the canvas."""
     (row,) = conflict.rows
     who = f"layer {row.layer!r} (pattern {row.pattern!r})"

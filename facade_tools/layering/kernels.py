@@ -19,10 +19,10 @@ from typing import Any
 import numpy as np
 
 from ..compiled import compiled
+from .kernels_columns import advanced, column_hash, contradicts, occluded
 from .kernels_labels import (
     AFTER,
     ALIVE,
-    ASKS,
     BEAM,
     BEST,
     BUDGET,
@@ -31,8 +31,6 @@ from .kernels_labels import (
     DEPTH,
     HAS_GRIPS,
     HIGH,
-    IS_BARE,
-    IS_CLEAR,
     IS_SOLID,
     LABELS,
     LEAST,
@@ -41,7 +39,6 @@ from .kernels_labels import (
     MAX_STEPS,
     MORE,
     MOST,
-    NEEDS_GAP,
     NEXT,
     OMEGA,
     OPEN,
@@ -68,7 +65,6 @@ from .kernels_labels import (
 from .kernels_pairs import hopeless, to_come
 
 Array = Any  # integer arrays; numba knows their exact types
-_MIX = np.uint64(0x9E3779B97F4A7C15)
 
 
 @compiled
@@ -100,8 +96,8 @@ def search(  # noqa: C901 - one flat loop: a compiled call a row would cost more
         for at in range(starts[r], starts[r + 1]):
             depth = max(depth, places[at, DEPTH] >> 1)
         total += depth
-    order, able = _row_order(m, rows[:, SOLID])
-    ahead = _letters_ahead(m, starts, places, steps)
+    order, able = row_order(m, rows[:, SOLID])
+    ahead = letters_ahead(m, starts, places, steps)
     guided = len(guide[1]) > 0
     now = np.zeros(m, np.int64)  # the place of each row that has chosen
     max_labels, max_states = capacity[0], capacity[1]
@@ -249,7 +245,7 @@ def search(  # noqa: C901 - one flat loop: a compiled call a row would cost more
 
 
 @compiled
-def _row_order(m: int, solid: Array) -> Any:
+def row_order(m: int, solid: Array) -> Any:
     """Return rows with most opaque letters first, and whether such are left from each place on.
 
     A column needs an opaque substring, and the first one that is chosen narrows all others.
@@ -262,7 +258,7 @@ def _row_order(m: int, solid: Array) -> Any:
 
 
 @compiled
-def _letters_ahead(m: int, starts: Array, places: Array, steps: Array) -> Any:
+def letters_ahead(m: int, starts: Array, places: Array, steps: Array) -> Any:
     """Return the most letters that each row has, and at the end the least size of a column."""
     out = np.zeros(m + 1, np.int64)
     for r in range(m):
@@ -276,7 +272,7 @@ def _letters_ahead(m: int, starts: Array, places: Array, steps: Array) -> Any:
 
 
 @compiled
-def _finish(  # noqa: C901 - called once a column
+def _finish(
     m: int, rows: Array, places: Array, tally: Array, keys: Array, steps: Array, spelling: Any,
     forbidden: Array, limits: Array, labels: Array, reach: Array, codes: Array, head: Array,
     chain: Array, bucket: Array, slots: Array, first: Array, status: Array,
@@ -287,39 +283,22 @@ def _finish(  # noqa: C901 - called once a column
     """Check the column that every row has chosen for, and add its label."""
     if not opaque and not limits[LOOSE]:
         return
-    if _occluded(m, steps, taken):
+    if occluded(m, steps, taken):
         return
     size = labels[label, SIGMA] + upper
     omega = labels[label, OMEGA] + max(np.int64(0), upper - lower)
-    progress = np.int64(0)
-    fewest = np.int64(2**62)  # columns to come, at most
-    for r in range(m):
-        here, been = codes[state, r] >> 2, (codes[state, r] >> 1) & 1
-        there = here if taken[r] < 0 else steps[taken[r], TO_PLACE]
-        rest = places[there, REST]
-        opened = places[there, OPEN]
-        if opened:
-            if there == here:
-                grip[r, 0] = min(places[there, MOST], reach[label, r, 0] + upper)
-                grip[r, 1] = reach[label, r, 1] + lower
-            else:
-                grip[r, 0] = min(places[there, MOST], upper - full_low[r])
-                grip[r, 1] = max(np.int64(0), lower - full_high[r])
-            rest -= min(places[there, LEAST], grip[r, 0])
-        if size + rest > limits[WIDEST]:
-            return
-        code[r] = 4 * there + 2 * been
-        if taken[r] < 0:
-            code[r] = 4 * there + 2 * rows[r, NEEDS_GAP] + places[there, ASKS]
-        progress += places[there, DEPTH] >> 1
-        spare = (limits[WIDEST] - size - rest) // ahead[m]
-        fewest = min(fewest, ahead[r] - (places[there, DEPTH] >> 1) + spare)
+    progress, fewest = advanced(
+        m, rows, places, steps, limits, ahead, codes[state], taken, upper, lower, full_low,
+        full_high, reach[label], code, grip, size,
+    )  # fmt: skip
+    if progress < 0:
+        return
     if (
         labels[label, COLUMNS] + 1 + fewest < limits[MORE]
         and omega + to_come(m, code, starts, guide) >= limits[RIVAL]
     ):
         return
-    if _contradicts(m, places, codes[state], code, taken, tally):
+    if contradicts(m, places, codes[state], code, taken, tally):
         return
     if len(forbidden):
         value = column_hash(m, places, keys, codes[state], code, taken)
@@ -341,66 +320,3 @@ def _finish(  # noqa: C901 - called once a column
         slots[at], label, omega, size, labels[label, PIECES] + cut, m, places, first, steps,
         spelling, limits, labels, reach, codes, head, status, grip,
     )  # fmt: skip
-
-
-@compiled
-def _occluded(m: int, steps: Array, taken: Array) -> bool:
-    """Tell whether an unoccludable letter has a layer above it that is not transparent."""
-    covered = False
-    for r in range(m):
-        if taken[r] >= 0:
-            if covered and steps[taken[r], IS_BARE]:
-                return True
-            covered = covered or not steps[taken[r], IS_CLEAR]
-    return False
-
-
-@compiled
-def _contradicts(
-    m: int, places: Array, before: Array, after: Array, taken: Array, tally: Array
-) -> bool:
-    """Tell whether a whole substring is part of another one, which no positive sizes allow."""
-    reference = -1
-    for r in range(m):
-        a, b = before[r] >> 2, after[r] >> 2
-        if taken[r] < 0 or places[a, OPEN] or places[b, OPEN]:
-            continue
-        if reference < 0:
-            reference = r
-            continue
-        c, d = before[reference] >> 2, after[reference] >> 2
-        less, more = False, False
-        for s in range(tally.shape[1]):
-            mine, theirs = tally[b, s] - tally[a, s], tally[d, s] - tally[c, s]
-            less = less or mine < theirs
-            more = more or mine > theirs
-        if less != more:
-            return True
-    return False
-
-
-@compiled
-def column_hash(
-    m: int, places: Array, keys: Array, before: Array, after: Array, taken: Array
-) -> np.uint64:
-    """Return a 64-bit hash of what every row has in a column."""
-    value = np.uint64(0)
-    for r in range(m):
-        if taken[r] >= 0:
-            a, b = before[r] >> 2, after[r] >> 2
-            pieces = places[a, OPEN] + places[b, OPEN]
-            value += row_hash(r, keys[a], keys[b], pieces)
-    return value
-
-
-@compiled
-def row_hash(row: int, before: np.uint64, after: np.uint64, pieces: int) -> np.uint64:
-    """Return the hash of a substring: of its letters; of its places where it has pieces."""
-    part = np.uint64(row + 1) * _MIX
-    if pieces:
-        part ^= before * np.uint64(0x94D049BB133111EB)
-        part += after * np.uint64(0xD6E8FEB86659FD93) + np.uint64(pieces)
-    else:
-        part += after - before
-    part = (part ^ (part >> np.uint64(31))) * _MIX
-    return part ^ (part >> np.uint64(27))

@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from .alignment import Aligner, Effort, Task, key_of
+from .alignment import Aligner
 from .candidates import Generator
 from .evaluation import evaluate, least_error
 from .problem import LEAST_UNSIZED, SLACK, TOLERANCES, Alignment, Candidate, Direction
 from .sizing import conflict
+from .tasks import Effort, Task, key_of
 
 UNITS = 8  # lengths that sizes are rounded to, at most
 DRAWS = 3  # of the unsized sizes, for each of them

@@ -134,7 +134,8 @@ class Rows:
     """The flat arrays of a candidate; see kernels.search.
 
     layers[row] are the layers whose word the row is: equal words that hold nothing unoccludable
-    are one row.
+    are one row. names: the symbols that tally counts; letters (places,): which of them a place
+    lies inside of, or -1.
     """
 
     starts: Integers
@@ -148,6 +149,8 @@ class Rows:
     spelling: tuple[Integers, Integers, Integers, Integers]
     lattices: tuple[Lattice, ...]
     layers: tuple[tuple[int, ...], ...]
+    names: tuple[str, ...]
+    letters: Integers
 
     @property
     def narrowest(self) -> int:
@@ -213,7 +216,20 @@ class RowMaker:
             ),
             tuple(distinct),
             tuple(map(tuple, grouped)),
+            tuple(self.names[i] for i in used),
+            self._letters(distinct, graphs, used),
         )
+
+    def _letters(
+        self, lattices: Sequence[Lattice], graphs: Sequence[Graph], used: list[int]
+    ) -> Integers:
+        """Return which of the symbols each place lies inside of; -1 for nodes."""
+        out = []
+        for lattice, graph in zip(lattices, graphs, strict=True):
+            out += [-1] * lattice.size
+            for at in graph.opens:
+                out.append(used.index(self.index[lattice.edges[at].letter.symbol]))
+        return np.array(out, np.int64)
 
     def _info(
         self, lattices: Sequence[Lattice], graphs: Sequence[Graph], grouped: list[list[int]]

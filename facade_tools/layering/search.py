@@ -8,12 +8,13 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from ..randomness import item_generator
-from .alignment import Aligner, Effort, Found, Key, Task, full_key
+from .alignment import Aligner
 from .bounds import size_floor
 from .candidates import Generator
 from .lattice import FEW_WORDS
 from .problem import SLACK, TOLERANCES, Alignment, Candidate, Direction
 from .rescue import GLANCE, Rescue
+from .tasks import Effort, Found, Key, Task, full_key
 
 BUDGETS = (0.0, 1 / 16, 1 / 4, 1.0)  # of µ: Ω is looked for from below
 QUICK = Effort(labels=20_000, steps=400_000, nodes=32, beam=24)

@@ -10,7 +10,7 @@ from itertools import islice, product
 from ..artifacts.design import Canvas, Design
 from ..artifacts.layout import Group, Layout
 from ..errors import Infeasible
-from .alignment import Key, full_key, prepare
+from .alignment import prepare
 from .evaluation import evaluate
 from .explain import explanation
 from .language import counters_of, symbols_of
@@ -19,6 +19,7 @@ from .search import Answer, Clock, GroupSearch
 from .shapes import Line, PlacedLetter, grid_of
 from .sizing import Sizing, conflict, solve, substring_sizes
 from .stack import Axis, Stack, stack_of
+from .tasks import Key, full_key
 
 TIME_LIMIT = 10.0  # seconds
 MOST_VARIATIONS = 64

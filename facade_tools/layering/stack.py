@@ -26,6 +26,7 @@ Axis = Literal["x", "y"]
 SETTINGS = ("pattern", "control", "reflection", "visible", "shapes")
 DEFAULT_GROUP = "default"
 MOST_REPEATS = 10_000
+MOST_CANVAS = 1e6  # m
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +48,10 @@ class Stack:
     patterns: Mapping[str, Pattern]
 
     def direction(self, axis: Axis, length: float | None = None) -> Direction:
-        """Return what one direction is solved from, on a canvas of `length` (m)."""
+        """Return what one direction is solved from, on a canvas of `length` (m).
+
+        Raises InvalidInput where that is no length.
+        """
         canvas = self.design.canvas
         own = canvas.width if axis == "x" else canvas.height
         groups: dict[str, list[LayerPattern]] = {}
@@ -58,6 +62,10 @@ class Stack:
             )
             groups.setdefault(group_of(layer, axis), []).append(row)
         length = own if length is None else length
+        if not 0.0 < length <= MOST_CANVAS:
+            what = "width" if axis == "x" else "height"
+            problem = f"a canvas of {length:g} m; expected more than 0, at most {MOST_CANVAS:g} m"
+            raise InvalidInput(problem, pointer=f"/canvas/{what}")
         return Direction(
             axis,
             length,

@@ -12,6 +12,7 @@ from .language import Alternation, Exponent, Node, Power, Sequence, Substituted,
 Reflection = Literal["reverse", "mirror", "reverse-mirror"]
 MAX_WORDS = 4096  # of one pattern under one assignment of the counters
 MAX_LETTERS = 2000  # of one word
+MAX_TRIED = 4_000_000  # words put together from two lists
 
 
 class Letter(NamedTuple):
@@ -89,12 +90,6 @@ class _Expander:
     def size(self, word: Word) -> float:
         return sum(self.how.sizes[letter.symbol] for letter in word)
 
-    def _fits(self, word: Word) -> bool:
-        if len(word) > MAX_LETTERS:
-            self.complete = False
-            return False
-        return self.size(word) <= self.how.limit
-
     def _node(self, node: Node, control: bool) -> list[Word]:
         match node:
             case Symbol(name):
@@ -113,7 +108,7 @@ class _Expander:
             return [self.bound[name]]
         transparent = control or name in self.how.transparent
         word = (Letter(name, False, transparent),)
-        return [word] if self._fits(word) else []
+        return [word] if self.size(word) <= self.how.limit else []
 
     def _unique(self, words: list[Word]) -> list[Word]:
         kept = list(dict.fromkeys(words))
@@ -129,15 +124,26 @@ class _Expander:
 
     def _joined(self, heads: list[Word], tails: list[Word]) -> list[Word]:
         out: dict[Word, None] = {}
+        known = [(tail, self.size(tail)) for tail in tails]
+        least = min((size for _, size in known), default=0.0)
+        tried = 0
         for head in heads:
-            for tail in tails:
-                word = head + tail
-                if self._fits(word):
-                    out[word] = None
-            if len(out) > self.how.most or self.how.late():
+            room = self.how.limit - self.size(head)
+            if least > room:
+                continue
+            for tail, size in known:
+                if size <= room and self._short(head, tail):
+                    out[head + tail] = None
+            tried += len(known)
+            if len(out) > self.how.most or tried > MAX_TRIED or self.how.late():
                 self.complete = False
                 break
         return list(out)[: self.how.most]
+
+    def _short(self, head: Word, tail: Word) -> bool:
+        short = len(head) + len(tail) <= MAX_LETTERS
+        self.complete = self.complete and short
+        return short
 
     def _power(self, base: Node, exponent: Exponent, control: bool) -> list[Word]:
         count = exponent.value(self.how.counters)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from facade_tools.artifacts.documents import decode, encode
-from facade_tools.artifacts.grammar import Grammar, Rule, Size
+from facade_tools.artifacts.grammar import Grammar, Node, Rule, Size
 from facade_tools.artifacts.parse import LABELS
 from facade_tools.errors import Infeasible, InvalidInput
 from facade_tools.grammar.derivation import leaves, painted
@@ -184,6 +184,21 @@ def test_regions_tile_and_floors_are_storeys():
     assert all(f.y0 < f.y1 and list(f.columns) == sorted(f.columns) for f in floors)
     assert [f.y1 for f in floors] == sorted((f.y1 for f in floors), reverse=True)
     assert all(leaf.label for leaf in leaves(tree))
+
+
+def test_parts_of_a_tile_with_one_label_are_one_region():
+    def leaf(label, *scope):
+        return Node(label, scope, label=label)
+
+    door = Node("D", (0, 2, 4, 9), "up", None, (
+        leaf("door", 0, 6, 4, 9), leaf("wall", 0, 6, 4, 6), leaf("door", 0, 4, 4, 6),
+        leaf("wall", 0, 2, 4, 4)))  # fmt: skip
+    shop = Node("S", (4, 2, 9, 9), "up", None, (leaf("door", 4, 2, 9, 9),))
+    row = Node("R", (0, 2, 9, 9), "right", None, (door, shop))
+    tree = Node("I", (0, 0, 9, 9), "up", None, (row, leaf("wall", 0, 0, 9, 2)))
+    assert [(r.label, r.x0, r.y0, r.x1, r.y1) for r in regions_of(tree)] == [
+        ("door", 0, 4, 4, 9), ("wall", 0, 2, 4, 4), ("door", 4, 2, 9, 9), ("wall", 0, 0, 9, 2)
+    ]  # fmt: skip
 
 
 def test_the_walk_falls_and_never_beats_dp():

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,13 +128,30 @@ class _Builder:
 
 
 def regions_of(tree: Node) -> tuple[Region, ...]:
-    """Return the leaves as regions, those without pixels left out."""
-    out = []
-    for leaf in leaves(tree):
-        x0, y0, x1, y1 = (round(v) for v in leaf.scope)
+    """Return the leaves as regions, those without pixels left out.
+
+    Parts of one label that lie on each other in a tile are one region: a door is cut where its
+    neighbours are cut, but stays a door.
+    """
+    return tuple(_parts(tree))
+
+
+def _parts(node: Node) -> Iterator[Region]:
+    if not node.children:
+        x0, y0, x1, y1 = (round(v) for v in node.scope)
         if x1 > x0 and y1 > y0:
-            out.append(Region(leaf.label or "", x0, y0, x1, y1))
-    return tuple(out)
+            yield Region(node.label or "", x0, y0, x1, y1)
+        return
+    parts = [part for child in node.children for part in _parts(child)]
+    tile = node.split == "up" and not any(child.children for child in node.children)
+    yield from _joined(parts) if tile else parts
+
+
+def _joined(parts: Sequence[Region]) -> Iterator[Region]:
+    """Yield the parts of a tile from the bottom, those of one label that touch as one."""
+    for label, run in groupby(parts, key=lambda part: part.label):
+        own = list(run)
+        yield Region(label, own[0].x0, own[-1].y0, own[0].x1, own[0].y1)
 
 
 def with_confidence(

@@ -8,6 +8,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from learned_tables import as_readings, table_layout
 from scipy.special import gammaln
 
 from facade_tools.errors import InvalidInput
@@ -16,9 +17,8 @@ from facade_tools.exteriors.coordinates import Readings, read_attributes
 from facade_tools.exteriors.dataset import build, fit_scaling
 from facade_tools.exteriors.em import Prior, Statistics, Stop, run, unit_weights
 from facade_tools.exteriors.evaluation import negative_log_density
-from facade_tools.exteriors.groups import BitGroup, Coordinate
 from facade_tools.exteriors.holdout import compare_variants, splits, training_curve
-from facade_tools.exteriors.layout import GroupLayout, Layout, building_layout
+from facade_tools.exteriors.layout import building_layout
 from facade_tools.exteriors.learning import LearnOptions, learn_model, learn_readings
 from facade_tools.exteriors.network import Family, Network, Pooled, infer
 from facade_tools.exteriors.prior import shipped_prior
@@ -182,26 +182,6 @@ def known_model(rng, groups=5, styles_=3, edges=((0, 1), (1, 3), (2, 4))):
         return np.logaddexp.reduce(total - np.log(styles_), axis=1)
 
     return draw, log_density
-
-
-def table_layout(groups, bits):
-    rows = tuple(
-        GroupLayout(
-            f"g{g}",
-            "table",
-            tuple(Coordinate(f"g{g}.{i}", "identity", 0.01, (), -1e9, 1e9) for i in range(2)),
-            (),
-            (-1, -1),
-        )
-        for g in range(groups)
-    )
-    return Layout(rows, (BitGroup("bits", tuple(f"b{i}" for i in range(bits))),))
-
-
-def as_readings(values, bits):
-    empty = np.empty((len(bits), 0), dtype=np.int8)
-    ids = tuple(map(str, range(len(bits))))
-    return Readings(ids, tuple(values), tuple(empty for _ in values), bits)
 
 
 def test_a_known_model_is_recovered():

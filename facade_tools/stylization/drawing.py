@@ -67,8 +67,9 @@ def sheet_picture(sheet: StyleSheet, folder: Path | None = None) -> Picture:
     """Return a style sheet as rows of its four elevations, as in Figs. 3, 6, 8 and 9.
 
     The model with its textures, its blocks by role, the horizontal and the vertical groups
-    (insertable sections darker), and the variance signal of the largest vertical group with its
-    labels. folder: where its blocks.json and textures are; without it, groups alone.
+    (insertable sections darker), and the variance signal of the largest vertical group that has
+    windows, with its labels. folder: where its blocks.json and textures are; without it, groups
+    alone.
     """
     own, pictures = (None, {}) if folder is None else _beside(folder)
     places = _places(sheet, own)
@@ -206,14 +207,16 @@ def _inside(rule: SplitRule, size: float, pixels: int) -> Picture:
 
 
 def _signal(sheet: StyleSheet, pictures: Mapping[str, Picture], width: int) -> Picture:
-    """Return the variance signal, the mean texture and the labels of the largest group (Fig. 9)."""
+    """Return signal, mean texture and labels of the largest group that has windows (Fig. 9)."""
     members: dict[str, list[StyleFace]] = {}
     for wall in sheet.walls:
         for face in wall.faces:
             members.setdefault(face.vertical, []).append(face)
-    name = max(
-        members, key=lambda k: sum(abs(f.end - f.start) * (f.top - f.bottom) for f in members[k])
-    )
+    areas = {
+        k: sum(abs(f.end - f.start) * (f.top - f.bottom) for f in faces)
+        for k, faces in members.items()
+    }
+    name = max(areas, key=lambda k: (bool(group_rule(sheet, k).insertable), areas[k]))
     mean = mean_picture([pictures[face.texture] for face in members[name]], 0)
     columns = width - 2 * MARGIN
     signal = variance_signal(mean, 0)

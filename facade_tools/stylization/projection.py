@@ -20,7 +20,7 @@ MAX_PIXELS = 60_000_000  # of all faces together
 AMPLE_PIXELS = 8_000_000  # of all faces together, for more than the source's resolution
 DEFAULT_DENSITY = 16.0  # pixels a metre where the source has no textures
 MAX_DENSITY = 256.0
-REACH, NICHE = 0.06, 1.2  # of the plan's size, and at least (m): how far off a face its texture lies
+REACH, NICHE = 0.06, 1.2  # of the plan's size, but at least m: how far off its texture may lie
 UPRIGHT, INCLINED = 0.1, 0.05  # share of a normal that points to the viewer: of walls, of the rest
 
 # side -> axis along the wall, its direction from left to right, axis of the outward normal, sign

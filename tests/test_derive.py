@@ -327,6 +327,14 @@ def test_sample_grammars_make_valid_buildings():
         assert len(standing(made.volumes)) == 5
 
 
+def test_the_grammar_of_the_docs_is_whole(tmp_path):
+    text = (SAMPLES.parent.parent / "docs" / "derive.md").read_text()
+    whole = tmp_path / "docs.yaml"
+    whole.write_text(text.split("```yaml\n")[1].split("```")[0])
+    made = derive(load(str(whole)).grammar, rng=rng())
+    assert solid_of(made).is_volume
+
+
 def test_every_shipped_grammar_is_tested():
     assert builtin_names() == ["haussmann", "ksttp09", "modern", "victorian"]
 

@@ -237,6 +237,18 @@ class TestAlignment:
             keys = [full_key(one.alignment, 6.0) for one in (mixed, single)]
             assert keys[0] == keys[1]
 
+    @pytest.mark.parametrize("texts", [["AB"] * 6, ["AB"] * 5 + ["BA"], ["BAB"] * 3 + ["AB"] * 3])
+    def test_ties_of_many_equal_layers_are_proved(self, texts):
+        """A narrow letter leaves room to pull equal layers apart: more columns go first."""
+        rules = {"A": Rule(2.0), "B": Rule(0.3)}
+        problem = direction([parse(text) for text in texts], 2.4, rules)
+        expected = best(problem, [words_of(problem, row) for row in problem.groups["default"]])
+        found = answer(problem)
+        assert found.optimal
+        one = found.alignment
+        assert (one.tolerance, one.pieces, one.count) == (expected[0], *expected[2:4])
+        assert one.omega == pytest.approx(expected[1], abs=2e-6)
+
     def test_whole_sizes_and_an_unsized_symbol(self):
         """A range that is rounded to whole metres would make four columns look as good."""
         rules = {"A": Rule(2), "B": Rule(2), "C": Rule(1, opaque=False), "e": Rule(None)}

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import scipy.signal
 
-PROMINENT = 0.08  # of the likeness of equal pictures: what a maximum has, and stands out by
+PROMINENT = 0.1  # of the likeness of equal pictures: what a maximum has, and stands out by
 BAND = 31  # pixels: light and dark parts that are wider are no rhythm
 LEAST = 2  # pixels
 SHARE = 1 / 3  # of the greatest likeness, for the first distance that counts

@@ -27,7 +27,7 @@ SHARE = 0.15  # of the height that has relief somewhere, for a block to have bay
 FINE, MOST = 0.02, 4000  # m: places of the depth signal, and how many at most
 NARROWEST, WIDEST = 0.2, 8.0  # m: of a bay; wider relief is a wing, and stretches with its block
 CORNERS = 0.2  # of a wall in the plane of its corners, for that to be its plane
-PATIENCE = 0.7, 1.5  # least and most that the walls beside bays take: their pictures stretch, too
+PATIENCE = 0.5, 1.5  # least and most that the walls beside bays take: their pictures stretch, too
 SAME = 0.01  # change of size that leaves all as it is
 PLAIN = Group("bay", "vertical", "bay")  # of parts of faces: they are stretched with their piece
 

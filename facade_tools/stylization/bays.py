@@ -27,6 +27,7 @@ SHARE = 0.15  # of the height that has relief somewhere, for a block to have bay
 FINE, MOST = 0.02, 4000  # m: places of the depth signal, and how many at most
 NARROWEST, WIDEST = 0.2, 8.0  # m: of a bay; wider relief is a wing, and stretches with its block
 CORNERS = 0.2  # of a wall in the plane of its corners, for that to be its plane
+CORNER = 0.01  # m: relief nearer to a corner is the corner's
 PATIENCE = 0.5, 1.5  # least and most that the walls beside bays take: their pictures stretch, too
 SAME = 0.01  # change of size that leaves all as it is
 PLAIN = Group("bay", "vertical", "bay")  # of parts of faces: they are stretched with their piece
@@ -70,8 +71,8 @@ def relief_bays(floors: Sequence[StyleFloor], axis: int, size: float) -> Bays | 
         return None
     low, high = max(line[0] for line in lines), max(size - line[-1] for line in lines)
     first, *inner, last = rule.scalable
-    if low > first or high > last or sum(rule.scalable) < LEAST_WALL * size:
-        return None  # some floor is narrower: no bay can stand there
+    if first - low < CORNER or last - high < CORNER or sum(rule.scalable) < LEAST_WALL * size:
+        return None  # a chamfer or a wing, or some floor is narrower: no bay can stand there
     return Bays(low, SplitRule((first - low, *inner, last - high), rule.insertable), high)
 
 

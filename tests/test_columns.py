@@ -7,8 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from facade_tools.artifacts.stylesheet import StyleFloor
 from facade_tools.formats.mesh_reader import read_textured
 from facade_tools.formats.textured import GREY, Paint, TexturedMesh
+from facade_tools.stylization.bays import relief_bays
 from facade_tools.stylization.capture import capture_style
 from facade_tools.stylization.columns import aligned_rules, common_rule
 from facade_tools.stylization.groups import group_rule
@@ -83,3 +85,10 @@ def test_a_slope_that_becomes_a_step_keeps_its_texture():
     (picture,) = face_pictures(slope, [step], 8.0)
     assert picture.shape == (12, 72, 3)
     assert (picture == (40, 120, 80)).all()
+
+
+def test_relief_at_a_corner_is_no_bay():
+    cut = StyleFloor("b", 0.0, 9.0, (0.0, 3.0, 10.0), (0.0, 1.0, 6.0), ("01", "11"))
+    niche = StyleFloor("b", 0.0, 9.0, (0.0, 4.0, 6.0, 10.0), (0.0, 1.0, 6.0), ("101", "111"))
+    assert relief_bays([cut], 0, 10.0) is None
+    assert relief_bays([niche], 0, 10.0).rule.insertable == pytest.approx((2.0,), abs=0.05)

@@ -64,6 +64,11 @@ def run_capture(model: str, output: str, options: CaptureOptions, unit: str) -> 
         write_style(folder, sheet, blocks, capture.pictures)
 
 
+def is_style(path: str) -> bool:
+    """Tell whether a path is the folder of a style sheet: `--styles a/ b/ c/` names several."""
+    return (Path(path) / "stylesheet.json").is_file()
+
+
 def run_retarget(
     styles: Sequence[str],
     bases: Sequence[str],

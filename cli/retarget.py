@@ -15,7 +15,8 @@ from ._options import output, seed
     "--styles",
     multiple=True,
     metavar="STYLE_DIR",
-    help="Further style sheets (repeatable): each base takes one of all by similarity and seed.",
+    help="Further style sheets (repeatable; with it, folders of style sheets may also stand among "
+    "the bases): each base takes one of all by similarity and seed.",
 )
 @click.option(
     "--resize",
@@ -51,8 +52,12 @@ def command(
     Example:
       facade retarget tower-style houses.jsonl -o styled/
     """
-    from ._style import run_retarget
+    from ._style import is_style, run_retarget
 
     if output is None:
         raise click.UsageError("Missing option '-o': name a .glb, an .obj or a folder.")
-    run_retarget((style, *styles), bases, output, resize, reassign, seed)
+    more = [base for base in bases if styles and is_style(base)]
+    rest = [base for base in bases if base not in more]
+    if not rest:
+        raise click.UsageError("Missing argument 'BASE...'.")
+    run_retarget((style, *styles, *more), rest, output, resize, reassign, seed)

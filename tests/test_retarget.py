@@ -320,12 +320,15 @@ def test_several_styles_and_the_same_bytes_again(facade, facade_here, styles, tm
     blocks = [block | {"id": "a", "floors": 3}]
     base = {"schema": "facade-tools/blocks/1", "id": "b", "blocks": blocks}
     (tmp_path / "b.json").write_text(json.dumps(base))
-    for run, command in (("1", facade), ("2", facade_here)):  # one in a process of its own
-        done = command(
-            "retarget", tmp_path / "corner-house", tmp_path / "b.json",
-            "--styles", tmp_path / "u-court", "--seed", "3", "-o", tmp_path / run / "b.glb",
-        )  # fmt: skip
+    first, second = tmp_path / "corner-house", tmp_path / "u-court"
+    base = tmp_path / "b.json"
+    one = ("retarget", first, base, "--styles", first, "--styles", second)
+    other = ("retarget", first, base, "--styles", first, second)
+    for run, command, words in (("1", facade, one), ("2", facade_here, other)):
+        done = command(*words, "--seed", "3", "-o", tmp_path / run / "b.glb")  # 1: a new process
         assert done.returncode == 0, done.stderr
+    none = facade_here("retarget", first, "--styles", first, second, "-o", tmp_path / "c.glb")
+    assert none.returncode == 2
     assert (tmp_path / "1/b.glb").read_bytes() == (tmp_path / "2/b.glb").read_bytes()
 
 

@@ -95,6 +95,14 @@ def test_a_missing_edge_is_found_and_a_needless_one_dropped():
     assert {frozenset(pair) for pair in pairs} == {frozenset((0, 2))}
 
 
+def test_without_lateral_edges_the_other_steps_are_taken(three_styles):
+    three_styles.limits = replace(three_styles.limits, lateral=False)
+    found = settled_together(three_styles, network(three_styles, (2, 1, 2, 2), 2))
+    assert len(found.fit.network.style) == 3
+    assert [len(f.coef) for f in found.fit.network.families] == [2, 2, 2, 2]
+    assert all(f.inputs == () for f in found.fit.network.families)
+
+
 def test_no_step_lowers_the_score_and_all_are_listed(three_styles, monkeypatch):
     seen = []
     plain = joint_search.joint

@@ -56,13 +56,12 @@ def trial(search: Search, network: Network, best: Joint) -> Joint:
 
 
 def settled_together(search: Search, network: Network) -> Joint:
-    """Change single lateral edges and sizes while the score after EM together rises."""
+    """Change edges (where allowed), sizes and styles while the score after EM together rises."""
     best = joint(search, network)
-    if not search.limits.lateral:
-        return best
     failed: set[tuple[int, Inputs]] = set()
     while True:
-        best = settled_edges(search, best, failed)
+        if search.limits.lateral:
+            best = settled_edges(search, best, failed)
         grown = settled_styles(search, settled_sizes(search, best))
         if grown is best:
             return best

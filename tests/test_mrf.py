@@ -13,6 +13,7 @@ from facade_tools.artifacts.documents import decode, encode
 from facade_tools.artifacts.parse import LABELS
 from facade_tools.errors import Infeasible
 from facade_tools.imaging.image_io import Photo
+from facade_tools.reconstruction.dormers import with_dormers
 from facade_tools.reconstruction.evidence import (
     agreement,
     profiles,
@@ -21,7 +22,7 @@ from facade_tools.reconstruction.evidence import (
 )
 from facade_tools.reconstruction.lines import differences, earth_movers, segments
 from facade_tools.reconstruction.mrf import Scale, read_facade
-from facade_tools.reconstruction.storeys import Band, _kept, period, skyline
+from facade_tools.reconstruction.storeys import Band, Facade, _kept, period, skyline
 
 WALL, GLASS, SKY, SHOP = (206, 190, 160), (50, 60, 74), (180, 205, 240), (90, 40, 36)
 FLOOR, STRIPE = 60, 70  # pixels
@@ -205,6 +206,42 @@ def test_the_rim_of_a_rectified_picture_says_nothing():
 def test_the_period_of_a_rhythm():
     assert period(np.sin(np.arange(240) * 2 * np.pi / 30)) == pytest.approx(30, abs=1)
     assert period(np.zeros(100)) == 20
+
+
+def thin_roof(sky: int, height: int, relief: float) -> tuple[Facade, list[Band]]:
+    """A roof of so many cells over two floors; its dormers show so much of what windows do."""
+    n = sky + height + 60
+    plane = np.zeros((n, 60), np.float32)
+    wave = np.sign(np.sin(np.arange(60) * 2 * np.pi / 20)).astype(np.float32)
+    plane[sky : sky + height] = relief * wave
+    bands = []
+    for y1 in (n, n - 30):
+        plane[y1 - 22 : y1 - 6] = wave
+        bands.append(Band("floor", y1 - 30, y1, y1 - 22, y1 - 6, 1.0, 0.3))
+    foot = sky + height
+    bands.append(Band("roof", sky, foot, foot, foot, 0.0, 0.0))
+    facade = Facade(np.zeros((n, 60, 3)), plane, np.zeros(n + 1), sky, 30)
+    return facade, bands
+
+
+@pytest.mark.parametrize(("sky", "height", "relief", "found"), [
+    (20, 14, 0.8, True), (20, 14, 0.2, False), (20, 9, 0.8, False),
+    (2, 14, 0.8, False), (60, 14, 0.8, False),
+])  # fmt: skip
+def test_a_thin_roof_under_the_sky_has_dormers_where_it_holds_as_much(sky, height, relief, found):
+    facade, bands = thin_roof(sky, height, relief)
+    roof = with_dormers(facade, bands)[-1]
+    assert roof.kind == "roof"
+    assert (roof.y0, roof.y1) == (sky, sky + height)
+    assert (roof.high > roof.low) == found
+    assert sky <= roof.low <= roof.high <= sky + height
+
+
+def test_a_roof_that_has_its_row_and_a_facade_without_rows_stay_as_they_are():
+    facade, bands = thin_roof(20, 14, 0.8)
+    seen = [*bands[:-1], Band("roof", 20, 34, 22, 30, 0.5, 0.2)]
+    assert with_dormers(facade, seen) == seen
+    assert with_dormers(facade, bands[-1:]) == bands[-1:]
 
 
 def transport(one: np.ndarray, two: np.ndarray, palette: np.ndarray) -> float:

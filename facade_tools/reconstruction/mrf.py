@@ -19,6 +19,7 @@ from ..grammar.derivation import leaves, painted
 from ..grammar.reading import Method, Reading, ReadOptions, label_index
 from ..imaging.image_io import Photo, fitted
 from . import storeys as floors_module
+from .dormers import with_dormers
 from .evidence import Evidence, agreement, profiles, window_evidence
 from .lines import differences, segments
 from .potentials import CELL
@@ -61,6 +62,7 @@ def read_facade(
     del rng
     facade = in_cells(photo, scale, mask)
     bands, energy = storeys(facade)
+    bands = with_dormers(facade, bands)
     chain = stripes(facade)
     columns = spans(chain, bands, facade.plane)
     shape = photo.pixels.shape[:2]

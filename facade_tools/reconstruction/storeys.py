@@ -25,7 +25,7 @@ from .potentials import (
 
 GROUND = (24, 60)  # cells: sizes of the ground floor, 2.4 to 6 m
 FLOOR = (24, 42)  # of the other floors, 2.4 to 4.2 m
-ROOF = 60  # cells: the highest roof
+ROOF = 30  # cells: the highest roof, a storey; more is a floor and a roof
 STOREY = 3.0  # m: what a storey measures where nobody says
 LEAST_BAND = 3  # cells: lower windows are none
 HALF = 8  # cells: the least part of a roof

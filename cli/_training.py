@@ -14,6 +14,7 @@ from facade_tools.randomness import item_generator
 from facade_tools.segmentation.boosting import BoostOptions
 from facade_tools.segmentation.classifier import save
 from facade_tools.segmentation.conventions import convention
+from facade_tools.segmentation.network_training import NetworkOptions
 from facade_tools.segmentation.patches import ForestOptions
 from facade_tools.segmentation.training import TrainOptions, read_pairs, train
 
@@ -30,6 +31,7 @@ def run_training(
         pixels=values["pixels"], augment=values["augment"], balance=values["balance"],
         boost=BoostOptions(rounds=values["rounds"]),
         forest=ForestOptions(values["trees"], values["depth"], values["patch"]),
+        network=NetworkOptions(steps=values["steps"]),
     )  # fmt: skip
     pairs = list(read_pairs(images, labels, convention(values["classes"])))
     data = save(train(pairs, options, rng=item_generator(seed, "train-parser")))

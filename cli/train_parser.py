@@ -18,7 +18,7 @@ from . import _options
 )  # fmt: skip
 @click.option(
     "--features", type=click.Choice(["context", "patch"]), default="context", show_default=True,
-    help="context: boosted trees with auto-context; patch: the forest of TSKP10.",
+    help="context: boosted trees with auto-context and a network; patch: the forest of TSKP10.",
 )  # fmt: skip
 @click.option("--stages", type=click.IntRange(1, 6), default=4, show_default=True,
               help="Stages of auto-context; the last two see the picture itself.")  # fmt: skip
@@ -34,6 +34,8 @@ from . import _options
               help="Varied copies a picture: mirror, light, blur, perspective.")  # fmt: skip
 @click.option("--balance", type=click.FloatRange(0, 1), default=0.0, show_default=True,
               help="0 weighs pixels equally, 1 classes.")  # fmt: skip
+@click.option("--steps", type=click.IntRange(0, 10**6), default=2500, show_default=True,
+              help="Views that train the network beside the trees; 0: trees alone.")  # fmt: skip
 @click.option("--trees", type=click.IntRange(1, 500), default=10, show_default=True,
               help="Trees of the patch forest.")  # fmt: skip
 @click.option("--depth", type=click.IntRange(1, 30), default=18, show_default=True,

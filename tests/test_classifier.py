@@ -17,12 +17,14 @@ from facade_tools.segmentation.boosting import BoostOptions, train_boosted
 from facade_tools.segmentation.classifier import Classifier, decoded, default, save
 from facade_tools.segmentation.conventions import CONVENTIONS, convention
 from facade_tools.segmentation.evaluation import Tally, boxes_of_labels, groups, matched
+from facade_tools.segmentation.network_training import NetworkOptions
 from facade_tools.segmentation.painting import render_facade
 from facade_tools.segmentation.patches import ForestOptions, patch_codes, patch_tests
 from facade_tools.segmentation.training import Pair, TrainOptions, class_weights, train
 from facade_tools.segmentation.trees import Node, add_scores, packed
 
 SMALL = BoostOptions(rounds=6, leaves=8, depth=5, least=5)
+TREES = NetworkOptions(steps=0)
 
 
 def rendered(seed, width=110, height=160):
@@ -38,7 +40,9 @@ def pairs():
 
 @pytest.fixture(scope="module")
 def trained(pairs):
-    options = TrainOptions(stages=2, height=160, coarse=96, pixels=1500, early=SMALL, boost=SMALL)
+    options = TrainOptions(
+        stages=2, height=160, coarse=96, pixels=1500, early=SMALL, boost=SMALL, network=TREES
+    )
     return train(pairs, options, rng=np.random.default_rng(0))
 
 
@@ -152,7 +156,14 @@ def test_classifiers_learn_round_trip_and_are_the_same_again(kind, request, pair
 
 def test_training_is_deterministic(pairs):
     options = TrainOptions(
-        stages=2, height=96, coarse=48, pixels=200, augment=1, balance=0.5, boost=SMALL
+        stages=2,
+        height=96,
+        coarse=48,
+        pixels=200,
+        augment=1,
+        balance=0.5,
+        boost=SMALL,
+        network=TREES,
     )
     one = train(pairs[:2], options, rng=np.random.default_rng(3))
     assert save(one) == save(train(pairs[:2], options, rng=np.random.default_rng(3)))
@@ -292,7 +303,7 @@ def test_train_parser_end_to_end(facade, pairs, tmp_path):
         cv2.imwrite(str(tmp_path / "images" / f"{pair.name}.png"), pair.picture[:, :, ::-1])
         cv2.imwrite(str(tmp_path / "labels" / f"{pair.name}.png"), pair.labels)
     out = tmp_path / "model.npz"
-    options = ("--stages", 1, "--rounds", 3, "--height", 96, "--pixels", 100)
+    options = ("--stages", 1, "--rounds", 3, "--height", 96, "--pixels", 100, "--steps", 0)
     done = facade("train-parser", tmp_path / "images", tmp_path / "labels", *options, "-o", out)
     assert done.returncode == 0, done.stderr
     assert isinstance(decoded(out.read_bytes()), Classifier)

@@ -20,6 +20,7 @@ from ..imaging.features import Picture, blurred
 from ..imaging.features_context import Probabilities
 from ..imaging.image_io import fitted
 from .autocontext import run_stages
+from .network import Network
 from .patches import patch_codes, patch_tests
 from .trees import Trees
 
@@ -29,6 +30,7 @@ MAX_NODES = 20_000_000
 MAX_CLASSES = 100
 MAX_PIXELS = 400_000  # at working resolution
 KINDS = ("context", "patch")
+NETWORK = "network."  # before the names of its arrays
 SMOOTH = 1 / 480  # of the working picture's rows
 
 _ARRAYS = {
@@ -43,7 +45,8 @@ class Classifier:
 
     kind: `context` (features of the picture, then of the beliefs too) or `patch` (the paper's
     forest). height: rows of the working resolution. coarse: rows at which all stages but the last
-    `fine` ones look at the picture. patch: side of the patches. about: free notes.
+    `fine` ones look at the picture. patch: side of the patches. about: free notes. network: what
+    is asked beside the stages of context, its belief counting as much as theirs.
     """
 
     kind: str
@@ -54,6 +57,7 @@ class Classifier:
     patch: int = 0
     about: str = ""
     fine: int = 1
+    network: Network | None = None
 
     def working(self, picture: Picture) -> Picture:
         """Return a picture at the resolution that the classifier works at."""
@@ -74,7 +78,11 @@ class Classifier:
 
     def _both_ways(self, working: Picture) -> Probabilities:
         def believed(picture: Picture) -> Probabilities:
-            return run_stages(self.stages, picture, self.coarse, self.fine)
+            belief = run_stages(self.stages, picture, self.coarse, self.fine)
+            if self.network is None:
+                return belief
+            both: Probabilities = (belief + self.network.probabilities(picture)) / np.float32(2)
+            return both
 
         mirrored = np.ascontiguousarray(working[:, ::-1])
         with ThreadPoolExecutor(2) as pool:  # compiled loops let go of the interpreter
@@ -98,6 +106,10 @@ def save(classifier: Classifier) -> bytes:
     for number, trees in enumerate(classifier.stages):
         for name, (kind, _) in _ARRAYS.items():
             arrays[f"{name}{number}"] = getattr(trees, name).astype(kind)
+    if classifier.network is not None:
+        arrays["widths"] = np.array(classifier.network.widths)
+        for name, weights in classifier.network.weights.items():
+            arrays[NETWORK + name] = weights.astype(np.float16)
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
         for name, array in arrays.items():
@@ -141,6 +153,7 @@ def decoded(data: bytes) -> Classifier:
         about = str(arrays["about"])
         count = sum(name.startswith("feature") for name in arrays)
         stages = tuple(_stage(arrays, i, len(classes)) for i in range(count))
+        network = _network(arrays, len(classes)) if "widths" in arrays else None
     except KeyError as error:
         raise InvalidInput(f"has no array {error}; expected a classifier") from None
     except (TypeError, ValueError):
@@ -151,7 +164,7 @@ def decoded(data: bytes) -> Classifier:
         raise InvalidInput("has a working resolution out of range")
     if not 1 <= fine <= min(2, len(stages)):
         raise InvalidInput("has a number of fine stages out of range")
-    return Classifier(kind, classes, stages, height, coarse, patch, about, fine)
+    return Classifier(kind, classes, stages, height, coarse, patch, about, fine, network)
 
 
 def _arrays(data: bytes) -> dict[str, NDArray[Any]]:
@@ -175,6 +188,22 @@ def _stage(arrays: Mapping[str, NDArray[Any]], number: int, classes: int) -> Tre
     _check(parts, number, classes)
     parts["value"] = parts["value"].astype(np.float32)
     return Trees(**parts, classes=classes)
+
+
+def _network(arrays: Mapping[str, NDArray[Any]], classes: int) -> Network:
+    """Return the network in a file. Raises InvalidInput on arrays of other names or shapes."""
+    found = {
+        name.removeprefix(NETWORK): a for name, a in arrays.items() if name.startswith(NETWORK)
+    }
+    for name, array in found.items():
+        if array.dtype != np.float16 or not np.isfinite(array).all():
+            raise InvalidInput(f"array {NETWORK}{name} does not hold finite half floats")
+    widths = arrays["widths"].astype(np.int64)
+    if widths.shape != (4,):
+        raise InvalidInput("array widths does not hold four numbers")
+    a, b, c, d = (int(width) for width in widths)
+    weights = {name: array.astype(np.float32) for name, array in found.items()}
+    return Network((a, b, c, d), classes, weights)
 
 
 def _check(parts: Mapping[str, NDArray[Any]], number: int, classes: int) -> None:

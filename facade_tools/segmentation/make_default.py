@@ -9,6 +9,7 @@ import numpy as np
 from ..grammar.library import builtin
 from ..randomness import item_generator
 from .classifier import Classifier
+from .network_training import NetworkOptions
 from .painting import render_facade
 from .training import Pair, TrainOptions, train
 
@@ -31,4 +32,5 @@ def make_default(count: int = 150, seed: int = 0) -> Classifier:
     """Return the classifier trained on `count` rendered facades."""
     pairs = list(rendered_pairs(count, seed))
     rng: np.random.Generator = item_generator(seed, "default-classifier")
-    return train(pairs, TrainOptions(pixels=800, augment=0), rng=rng)
+    trees_alone = NetworkOptions(steps=0)
+    return train(pairs, TrainOptions(pixels=800, augment=0, network=trees_alone), rng=rng)

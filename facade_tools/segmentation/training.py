@@ -20,6 +20,7 @@ from .autocontext import FINE, Example, Labels, example, train_stages
 from .boosting import BoostOptions, train_boosted
 from .classifier import MAX_PIXELS, Classifier
 from .conventions import Convention
+from .network_training import NetworkOptions, train_network
 from .patches import ForestOptions, train_forest
 from .trees import Codes, Trees
 
@@ -34,7 +35,7 @@ class TrainOptions:
     coarse: rows at which all stages but the last two look. pixels: sampled a picture, variant and
     stage. inner: folds by picture for the beliefs that later stages train on. augment: varied
     copies a picture. balance: 0 weighs pixels equally, 1 gives each class the same weight.
-    early, boost: trees of all stages but the last two, and of these.
+    early, boost: trees of all stages but the last two, and of these. network: beside the trees.
     """
 
     features: str = "context"
@@ -48,6 +49,7 @@ class TrainOptions:
     early: BoostOptions = field(default_factory=lambda: BoostOptions(rounds=50, rate=0.17))
     boost: BoostOptions = field(default_factory=BoostOptions)
     forest: ForestOptions = field(default_factory=ForestOptions)
+    network: NetworkOptions = field(default_factory=NetworkOptions)
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +99,7 @@ def train(pairs: Sequence[Pair], options: TrainOptions, *, rng: np.random.Genera
         pictures = [(pair.picture, pair.labels) for pair in small]
         trees = train_forest(pictures, len(classes), options.forest, options.pixels, rng=rng)
         return Classifier("patch", classes, (trees,), height, height, options.forest.patch, about)
+    (own,) = rng.spawn(1)
     examples = list(_examples(small, options, rng))
     seed = int(rng.integers(2**31))
 
@@ -108,7 +111,11 @@ def train(pairs: Sequence[Pair], options: TrainOptions, *, rng: np.random.Genera
     early = [partial(fit, options.early)] * (options.stages - fine)
     fits = early + [partial(fit, options.boost)] * fine
     stages = train_stages(examples, fits, options.pixels, rng=rng)
-    return Classifier("context", classes, stages, height, options.coarse, 0, about, fine)
+    network = None
+    if options.network.steps:
+        views = [(pair.picture, pair.labels) for pair in small]
+        network = train_network(views, len(classes), options.network, rng=own)
+    return Classifier("context", classes, stages, height, options.coarse, 0, about, fine, network)
 
 
 def _working(pair: Pair, height: int) -> Pair:

@@ -233,7 +233,7 @@ def _bands(
 
 # What a row of windows must reach: shares of the median floor's agreement with the columns (of a
 # roof: of its evidence) and of its height.
-LEAST_SCORE = {"ground": 0.7, "floor": 0.15, "roof": 0.2}
+LEAST_SCORE = {"ground": 0.7, "floor": 0.15, "roof": 0.3}
 LEAST_HEIGHT = {"ground": 0.5, "floor": 0.25, "roof": 0.2}
 # A roof lower than this share of a storey is a cornice or a balustrade, unless what it shows
 # stands in the columns below as much as this share of the median floor's windows.

@@ -179,6 +179,7 @@ def test_a_classifier_keeps_its_network(trained):
         again.network.probabilities(picture), trained.probabilities(picture)
     )
     working = again.working(picture)
+    np.testing.assert_allclose(again.probabilities(working).sum(axis=0), 1, atol=1e-4)
     assert (again.probabilities(working) != default().probabilities(working)).any()
 
 

@@ -49,7 +49,7 @@ SOLVERS: Mapping[str, Solver] = {
 
 
 def forest_method(options: ReadOptions) -> Method:
-    """Return the method of TSKP10: trees believe, a grammar explains."""
+    """Return the method of TSKP10: a classifier believes, a grammar explains."""
     classifier = default() if options.classifier is None else load_classifier(options.classifier)
     name = "default" if options.classifier is None else Path(options.classifier).name
     plan = compiled_plan(options.grammar or DEFAULT)

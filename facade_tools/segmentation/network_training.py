@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +16,26 @@ from .network import Array, Convolve, Network, forward, inputs, pixels_of, shape
 from .views import Sizes, random_view
 
 State = tuple[dict[str, Array], ...]  # weights, both moments of their gradients, mean of weights
-Step = Callable[[State, Array, Array, float, int], tuple[State, Array]]
 
 WARM = 0.05  # of the steps, while the rate rises
 FIRST, SECOND, TINY = 0.9, 0.999, 1e-8  # Adam's constants
 REPORT = 200  # steps
 
 log = logging.getLogger(__name__)
+
+
+class Pace(NamedTuple):
+    """What changes from step to step.
+
+    rate: step length. number: of the step, from 1 on. memory: of the mean of weights.
+    """
+
+    rate: float
+    number: float
+    memory: float
+
+
+Step = Callable[[State, Array, Array, Pace], tuple[State, Array]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +71,7 @@ def train_network(
     state: State = (weights, nothing, dict(nothing), dict(weights))
     losses: list[Array] = []
     for number, (picture, labels) in enumerate(_views(pairs, options, rng)):
-        rate = options.rate * _rise_and_fall(number / options.steps)
-        state, loss = step(state, inputs(picture), labels.astype(np.int32), rate, number)
+        state, loss = step(state, inputs(picture), labels.astype(np.int32), _pace(options, number))
         losses.append(loss)
         if (number + 1) % REPORT == 0:
             log.info("step %d: loss %.3f", number + 1, np.mean([float(v) for v in losses]))
@@ -94,11 +106,13 @@ def _start(
     return weights
 
 
-def _rise_and_fall(share: float) -> float:
-    """Return the rate's share of its highest value: a short rise, then half a cosine."""
+def _pace(options: NetworkOptions, number: int) -> Pace:
+    """Return the pace of a step: a short rise of the rate, then half a cosine down."""
+    share, count = number / options.steps, number + 1.0
+    high = 0.5 + 0.5 * float(np.cos(np.pi * (share - WARM) / (1 - WARM)))
     if share < WARM:
-        return 0.04 + 0.96 * share / WARM
-    return 0.5 + 0.5 * float(np.cos(np.pi * (share - WARM) / (1 - WARM)))
+        high = 0.04 + 0.96 * share / WARM
+    return Pace(options.rate * high, count, min(options.memory, count / (9 + count)))
 
 
 def _compiled_step(classes: int, options: NetworkOptions) -> Step:
@@ -112,13 +126,12 @@ def _compiled_step(classes: int, options: NetworkOptions) -> Step:
         picked = logs * (labels[..., None] == jnp.arange(1, classes + 1))
         return -picked.sum() / jnp.maximum((labels > 0).sum(), 1)
 
-    def step(
-        state: State, seen: Array, labels: Array, rate: float, number: int
-    ) -> tuple[State, Array]:
+    def step(state: State, seen: Array, labels: Array, pace: Pace) -> tuple[State, Array]:
         value, gradients = jax.value_and_grad(loss)(state[0], seen, labels)
         length = jnp.sqrt(sum((g**2).sum() for g in gradients.values()))
         cut = jnp.minimum(1.0, options.longest / jnp.maximum(length, TINY))
-        return _descended(state, gradients, cut, rate, number, options), value
+        shorter = {name: cut * gradient for name, gradient in gradients.items()}
+        return _descended(state, shorter, pace, options.decay), value
 
     return jax.jit(step, donate_argnums=0)
 
@@ -136,9 +149,8 @@ def _convolution() -> Convolve:
     layout = ("NHWC", "HWIO", "NHWC")
 
     def plain(x: Array, kernel: Array) -> Array:
-        return lax.conv_general_dilated(x[None], kernel, (1, 1), "SAME", dimension_numbers=layout)[
-            0
-        ]
+        out = lax.conv_general_dilated(x[None], kernel, (1, 1), "SAME", dimension_numbers=layout)
+        return out[0]
 
     def gradients(seen: tuple[Array, Array], above: Array) -> tuple[Array, Array]:
         x, kernel = seen
@@ -162,22 +174,17 @@ def _convolution() -> Convolve:
     return convolve
 
 
-def _descended(
-    state: State, gradients: Mapping[str, Array], cut: Array, rate: Any, number: Any,
-    options: NetworkOptions,
-) -> State:  # fmt: skip
+def _descended(state: State, gradients: Mapping[str, Array], pace: Pace, decay: float) -> State:
     """Return the state after a step of AdamW (Loshchilov and Hutter 2019)."""
-    count = number + 1.0
-    memory = options.memory
-    memory = memory - (memory - count / (9.0 + count)) * (count / (9.0 + count) < memory)
     after: State = ({}, {}, {}, {})
     for name, gradient in gradients.items():
         weight, first, second, mean = (part[name] for part in state)
-        first = FIRST * first + (1 - FIRST) * cut * gradient
-        second = SECOND * second + (1 - SECOND) * (cut * gradient) ** 2
-        way = first / (1 - FIRST**count) / ((second / (1 - SECOND**count)) ** 0.5 + TINY)
-        weight = weight - rate * (way + options.decay * weight)
-        mean = memory * mean + (1 - memory) * weight
+        first = FIRST * first + (1 - FIRST) * gradient
+        second = SECOND * second + (1 - SECOND) * gradient**2
+        even = (second / (1 - SECOND**pace.number)) ** 0.5
+        way = first / (1 - FIRST**pace.number) / (even + TINY)
+        weight = weight - pace.rate * (way + decay * weight)
+        mean = pace.memory * mean + (1 - pace.memory) * weight
         for part, value in zip(after, (weight, first, second, mean), strict=True):
             part[name] = value
     return after

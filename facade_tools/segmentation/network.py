@@ -2,7 +2,7 @@
 
 An encoder and a decoder with skips (a U-Net) over four resolutions. Blocks of the coarser ones
 also see the means of their rows and columns, because a facade repeats along both. It is trained
-from nothing (network_training.py) and applied with NumPy alone.
+from nothing (network_training.py) and applied with NumPy and one compiled loop.
 """
 
 from __future__ import annotations

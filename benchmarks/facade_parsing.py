@@ -29,6 +29,7 @@ from facade_tools.segmentation.deriving import Frame, derivation, regions_of
 from facade_tools.segmentation.energy import field_of
 from facade_tools.segmentation.evaluation import Tally, boxes_of_labels, boxes_of_regions
 from facade_tools.segmentation.parsing import raw_labels
+from facade_tools.segmentation.railings import cut_railings
 from facade_tools.segmentation.training import TrainOptions, read_pairs, train
 
 GRAMMARS = ("haussmann", "haussmann-floors")
@@ -62,7 +63,10 @@ def measure(pair, classifier, plans, walks, tallies, times):
             solution = solve(field, made)
             times[f"{solver} {name}"].append(time.process_time() - start)
             times[f"{solver} {name} energy"].append(solution.energy)
-            tree = derivation(made, solution.layout, Frame(working.shape[:2], shape))
+            frame = Frame(working.shape[:2], shape)
+            tree = derivation(made, solution.layout, frame)
+            planes = dict(zip(classifier.classes, belief, strict=True))
+            tree = cut_railings(tree, made.grammar, planes, frame)
             labels = painted(tree, shape, label_index())
             key = f"{solver} {name}"
             tallies[key].add(pair.labels, labels, truth, boxes_of_regions(regions_of(tree)))

@@ -26,6 +26,7 @@ from .classifier import Classifier, default
 from .classifier import load as load_classifier
 from .deriving import Frame, derivation, floors_of, regions_of, with_confidence
 from .energy import Field, field_of
+from .railings import cut_railings
 
 IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -86,8 +87,9 @@ def read_facade(
     field = field_of(belief, reader.classifier.classes, reader.plan)
     solution = SOLVERS[reader.solver](field, reader.plan, rng)
     frame = Frame(working.shape[:2], shape)
-    tree = derivation(reader.plan, solution.layout, frame)
     planes = dict(zip(reader.classifier.classes, belief, strict=True))
+    tree = derivation(reader.plan, solution.layout, frame)
+    tree = cut_railings(tree, reader.plan.grammar, planes, frame)
     regions = with_confidence(regions_of(tree), planes, frame)
     floors = floors_of(tree)
     parse = Parse(

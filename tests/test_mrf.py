@@ -22,7 +22,9 @@ from facade_tools.reconstruction.evidence import (
 )
 from facade_tools.reconstruction.lines import differences, earth_movers, segments
 from facade_tools.reconstruction.mrf import Scale, read_facade
-from facade_tools.reconstruction.storeys import Band, Facade, _kept, period, skyline
+from facade_tools.reconstruction.periods import period, storey_period, whole_period
+from facade_tools.reconstruction.shops import with_shop
+from facade_tools.reconstruction.storeys import Band, Facade, _kept, skyline
 
 WALL, GLASS, SKY, SHOP = (206, 190, 160), (50, 60, 74), (180, 205, 240), (90, 40, 36)
 FLOOR, STRIPE = 60, 70  # pixels
@@ -208,6 +210,66 @@ def test_the_period_of_a_rhythm():
     assert period(np.zeros(100)) == 20
 
 
+def pattern(storeys: int, high: int, windows: int = 5) -> np.ndarray:
+    """Evidence of windows that stand over one another, 60 columns wide, mean 0 along rows."""
+    plane = np.zeros((storeys * high, 60), np.float32)
+    for storey, x in np.ndindex(storeys, windows):
+        y = storey * high + high // 3
+        plane[y : y + high // 2, 12 * x + 3 : 12 * x + 9] = 1.0
+    return plane - plane.mean(axis=1, keepdims=True)
+
+
+def test_whole_rows_say_the_period_where_their_profile_misleads():
+    plane = pattern(7, 30)
+    assert whole_period(plane) == pytest.approx(30, abs=1)
+    assert whole_period(np.zeros((100, 60), np.float32)) is None
+    halved, fine = (np.sin(np.arange(210) * 2 * np.pi / lag) for lag in (15, 29))
+    assert storey_period(halved, plane) == pytest.approx(30, abs=1)
+    assert storey_period(fine, plane) == pytest.approx(29, abs=1)
+    assert storey_period(halved, np.zeros((210, 60), np.float32)) == pytest.approx(15, abs=1)
+
+
+def over_a_shop(shop: np.ndarray, ground: int) -> tuple[np.ndarray, list[Band]]:
+    """Four floors of 30 cells over a shop (rows of evidence, 60 columns) cut at `ground`."""
+    plane = np.concatenate([pattern(4, 30), shop])
+    n = len(plane)
+    bands = [Band("ground", n - ground, n, n - ground + 4, n - 4, 1.0, 0.4)]
+    if ground < len(shop):
+        bands.append(Band("floor", 120, n - ground, 126, n - ground - 4, 1.0, 0.4))
+    floors = [Band("floor", y, y + 30, y + 10, y + 25, 1.0, 0.4) for y in (90, 60, 30, 0)]
+    return plane, bands + floors
+
+
+def pillars(rows: int) -> np.ndarray:
+    across = np.zeros(60, np.float32)
+    across[[0, 1, 2, 28, 29, 30, 57, 58, 59]] = 2.0
+    return np.tile(across - across.mean(), (rows, 1))
+
+
+def test_a_ground_floor_has_windows_where_it_looks_like_the_floors_above():
+    plane, bands = over_a_shop(pattern(1, 40), 40)
+    assert with_shop(plane, bands) == bands
+    plane, bands = over_a_shop(pillars(40), 40)
+    shop, *others = with_shop(plane, bands)
+    assert shop.high == shop.low
+    assert (shop.y0, shop.y1) == (120, 160)
+    assert others == bands[1:]
+
+
+def test_a_high_shop_cut_in_two_is_one():
+    plane, bands = over_a_shop(pillars(56), 28)
+    shop, *others = with_shop(plane, bands)
+    assert (shop.kind, shop.y0, shop.y1) == ("ground", 120, 176)
+    assert others == bands[2:]
+    plane, bands = over_a_shop(pillars(90), 45)  # too high for a ground floor
+    assert with_shop(plane, bands)[1:] == bands[1:]
+
+
+def test_few_floors_do_not_say_what_a_floor_looks_like():
+    plane, bands = over_a_shop(pillars(40), 40)
+    assert with_shop(plane, bands[:3]) == bands[:3]
+
+
 def thin_roof(sky: int, height: int, relief: float) -> tuple[Facade, list[Band]]:
     """A roof of so many cells over two floors; its dormers show so much of what windows do."""
     n = sky + height + 60
@@ -225,7 +287,7 @@ def thin_roof(sky: int, height: int, relief: float) -> tuple[Facade, list[Band]]
 
 
 @pytest.mark.parametrize(("sky", "height", "relief", "found"), [
-    (20, 14, 0.8, True), (20, 14, 0.2, False), (20, 9, 0.8, False),
+    (20, 14, 0.8, True), (20, 14, 0.2, False), (20, 9, 0.8, False), (20, 28, 0.8, False),
     (2, 14, 0.8, False), (60, 14, 0.8, False),
 ])  # fmt: skip
 def test_a_thin_roof_under_the_sky_has_dormers_where_it_holds_as_much(sky, height, relief, found):

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from .storeys import Band, Facade
 
-LEAST_ROOF = 11  # cells: a lower roof is a cornice or a balustrade
+# cells: a lower roof is a cornice or a balustrade, in a higher one the chain sees a row itself
+ROOF = (11, 24)
 SKY = (8, 40)  # cells of sky above: with fewer the roof's edge, with more the skyline is doubtful
 ENOUGH = 0.5  # of what the median floor's windows show: from here a roof holds dormers
 BLUR = 2.0  # cells
@@ -32,7 +33,7 @@ def with_dormers(facade: Facade, bands: Sequence[Band]) -> list[Band]:
     if not roofs or not rows or any(band.high > band.low for band in roofs):
         return list(bands)
     top, foot = min(band.y0 for band in roofs), max(band.y1 for band in roofs)
-    if foot - top < LEAST_ROOF or not SKY[0] <= facade.sky <= SKY[1]:
+    if not (ROOF[0] <= foot - top <= ROOF[1] and SKY[0] <= facade.sky <= SKY[1]):
         return list(bands)
     usual = float(np.median([_relief(facade.plane[band.low : band.high]) for band in rows]))
     if _relief(facade.plane[top:foot]) < ENOUGH * usual:

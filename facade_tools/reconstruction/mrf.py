@@ -22,8 +22,10 @@ from . import storeys as floors_module
 from .dormers import with_dormers
 from .evidence import Evidence, agreement, profiles, window_evidence
 from .lines import differences, segments
+from .periods import storey_period
 from .potentials import CELL
-from .storeys import STOREY, Band, Facade, period, skyline, storeys
+from .shops import with_shop
+from .storeys import STOREY, Band, Facade, skyline, storeys
 from .stripes import Span, roof_spans, spans, stripes
 
 ROWS, PIXELS = 320, 160_000  # the working picture
@@ -62,7 +64,7 @@ def read_facade(
     del rng
     facade = in_cells(photo, scale, mask)
     bands, energy = storeys(facade)
-    bands = with_dormers(facade, bands)
+    bands = with_dormers(facade, with_shop(facade.plane, bands))
     chain = stripes(facade)
     columns = spans(chain, bands, facade.plane)
     shape = photo.pixels.shape[:2]
@@ -102,7 +104,7 @@ def in_cells(photo: Photo, scale: Scale, mask: NDArray[np.bool_] | None = None) 
     rows = agreement(evidence.plane, profiles(evidence.plane)[1], 3.0, 0.5)
     sky = skyline(differences(found, reach), rows)
     colour = differences(found, reach, sky)
-    storey = period(rows[sky:])
+    storey = storey_period(rows[sky:], evidence.plane[sky:])
     cell = _cell(scale, storey, height - sky)
     return _facade(working, evidence, colour, sky, cell, storey)
 

@@ -1,4 +1,4 @@
-"""The storeys of a facade: its scale, the sky above it, the chain of its floors, its roof."""
+"""The storeys of a facade: the sky above it, the chain of its floors, its roof."""
 
 from __future__ import annotations
 
@@ -31,8 +31,6 @@ LEAST_BAND = 3  # cells: lower windows are none
 HALF = 8  # cells: the least part of a roof
 SECOND = 2.0  # cost of a second row of windows in a roof
 
-PEAK = 0.45  # a peak of the autocorrelation counts from this share of the highest
-HALF_PEAK = 0.2  # and one at half its lag from this share: two storeys were taken for one
 SKY = 8.0  # CIELAB units between the sky and a building
 BUSY = 4.0  # how much windows above a line speak against its being the skyline
 UPPER = 0.4  # share of the building where roofs may be, and columns of their own
@@ -59,36 +57,6 @@ class Band:
     high: int
     columns: float
     evidence: float
-
-
-def period(rows: Floats) -> float:
-    """Return the period of a profile of rows, in rows: the first high peak of its autocorrelation.
-
-    A fifth of the rows where there is none.
-
-    >>> period(np.sin(np.arange(200) * 2 * np.pi / 40))
-    40.0
-    """
-    n = len(rows)
-    calm = along_columns(rows, 0.006 * n)
-    calm = calm - calm.mean()
-    lags = np.arange(max(2, int(0.05 * n)), max(3, int(0.6 * n)))
-    values = np.array([_correlation(calm[lag:], calm[:-lag]) for lag in lags])
-    inner = (values[1:-1] >= values[:-2]) & (values[1:-1] > values[2:])
-    peaks = np.flatnonzero(inner) + 1
-    if len(peaks) == 0 or values[peaks].max() <= 0:
-        return n / 5
-    best = values[peaks].max()
-    first = peaks[values[peaks] > PEAK * best][0]
-    half = peaks[np.abs(lags[peaks] / lags[first] - 0.5) < 0.1]
-    if len(half) and values[half].max() > HALF_PEAK * best:
-        first = half[int(np.argmax(values[half]))]
-    return float(lags[first])
-
-
-def _correlation(one: Floats, two: Floats) -> float:
-    norm = np.sqrt((one**2).sum() * (two**2).sum())
-    return float((one * two).sum() / (norm + 1e-12))
 
 
 def skyline(differences: Floats, rows: Floats) -> int:

@@ -75,6 +75,31 @@ def test_floors_that_derive_alike_are_left_alone():
     assert cut(certain, symbol="GF") == facade("GF")
 
 
+def railing(x0, x1, label):
+    parts = (
+        Node("Ba", (x0, 24.0, x1, 32.0), label="balcony"),
+        Node("Wi", (x0, 8.0, x1, 24.0), label=label),
+    )
+    return Node("T", (x0, 8.0, x1, 32.0), "up", None, parts)
+
+
+def test_tiles_that_touch_share_the_top_of_their_railing():
+    # two windows of one balcony, wall between them, and a third with a railing of its own
+    kinds = [(0.0, 6.0, "window"), (6.0, 8.0, "wall"), (8.0, 12.0, "window")]
+    tiles = [railing(*kind) for kind in kinds]
+    wall = Node("Wa", (12.0, 8.0, 14.0, 32.0), label="wall")
+    row = Node("FL", (0.0, 8.0, 20.0, 32.0), "right", None,
+               (*tiles, wall, railing(14.0, 20.0, "window")))  # fmt: skip
+    plane = np.zeros((20, 10), np.float32)
+    for (low, high), last in {(0, 3): 10, (4, 6): 14, (7, 10): 15}.items():
+        plane[4:last, low:high] = 0.9
+    tree = cut_railings(row, builtin("haussmann-floors"), {"window": plane}, FRAME)
+    tops = [tile.children[0].scope[1] for tile in tree.children if tile.children]
+    assert tops == [24, 24, 24, 30]
+    assert all(tile.children[1].scope[3] == top for tile, top in
+               zip([t for t in tree.children if t.children], tops, strict=True))  # fmt: skip
+
+
 def test_without_belief_in_windows_nothing_changes():
     assert cut({}) == facade()
     assert cut_railings(facade(), builtin("haussmann-floors"), {}, FRAME) == facade()

@@ -1,14 +1,15 @@
-"""Railings cut window by window: each where its border is to be expected.
+"""Railings cut one by one: the top of each where it is to be expected.
 
-A solver cuts all tiles of a floor at one height. Where floors derive each for itself, tiles do so
-too: railings of one floor differ, and where the belief wavers between window and railing, the mean
+A solver cuts all tiles of a floor at one height. Where floors derive each for itself, railings do
+so too: those of one floor differ, and where the belief wavers between window and railing, the mean
 of the border is nearer to either reading than the likelier of the two.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,42 +27,65 @@ def cut_railings(tree: Node, grammar: Grammar, belief: Mapping[str, Plane], fram
     """Return the derivation with the railings before windows cut each for itself.
 
     belief: a plane (height, width) of every label at working resolution, top row first. Only tiles
-    of rows that derive each for itself change, and only the border inside them.
+    of rows that derive each for itself change, and only the border inside them. Tiles that touch
+    share their railing, and its top: the mean of what is expected before each of their windows.
     """
-    if WINDOW not in belief:
+    if WINDOW not in belief or not tree.children:
         return tree
-    return _changed(tree, grammar, belief[WINDOW], frame, False)
+    rule = grammar.rules.get(tree.symbol)
+    each = rule is not None and grammar.rules[rule.like or tree.symbol].derive == "each"
+    if each and tree.split == "right":
+        return replace(tree, children=tuple(_row(tree.children, belief[WINDOW], frame)))
+    children = tuple(cut_railings(child, grammar, belief, frame) for child in tree.children)
+    return replace(tree, children=children)
 
 
-def _changed(node: Node, grammar: Grammar, window: Plane, frame: Frame, each: bool) -> Node:
-    if not node.children:
-        return node
-    if each and tuple(child.label for child in node.children) == (RAILING, WINDOW):
-        return _cut(node, window, frame)
-    rule = grammar.rules.get(node.symbol)
-    own = rule is not None and grammar.rules[rule.like or node.symbol].derive == "each"
-    inner = own and node.split == "right"
-    children = tuple(_changed(c, grammar, window, frame, inner) for c in node.children)
-    return replace(node, children=children)
+def _row(tiles: Sequence[Node], window: Plane, frame: Frame) -> Iterator[Node]:
+    """Yield the tiles of a row, railing by railing."""
+    for railed, run in groupby(tiles, key=_railed):
+        own = list(run)
+        yield from _cut(own, window, frame) if railed else own
 
 
-def _cut(tile: Node, window: Plane, frame: Frame) -> Node:
-    """Return a tile of railing and window with the border between them where it is expected."""
-    railing, glass = tile.children
-    x0, top, x1, _ = glass.scope
-    bottom = tile.scope[3]
+def _railed(tile: Node) -> bool:
+    return len(tile.children) == 2 and tile.children[0].label == RAILING
+
+
+def _cut(tiles: list[Node], window: Plane, frame: Frame) -> list[Node]:
+    """Return tiles that share a railing with its top where it is expected."""
+    expected = [expected_border(tile, window, frame) for tile in tiles]
+    known = [border for border in expected if border is not None]
+    if not known:
+        return tiles
+    first = max(tile.scope[1] for tile in tiles) + 1
+    border = float(min(max(round(np.mean(known)), first), tiles[0].scope[3]))
+    return [_with_border(tile, border) for tile in tiles]
+
+
+def _with_border(tile: Node, border: float) -> Node:
+    railing, above = tile.children
+    lower = replace(railing, scope=(railing.scope[0], border, *railing.scope[2:]))
+    upper = replace(above, scope=(*above.scope[:3], border))
+    return replace(tile, children=(lower, upper))
+
+
+def expected_border(tile: Node, window: Plane, frame: Frame) -> float | None:
+    """Return where a tile's window is expected to end, pixels of the picture.
+
+    None where it holds no window, or belief says nothing of it.
+    """
+    glass = tile.children[1]
+    if glass.label != WINDOW:
+        return None
+    x0, top, x1, low = glass.scope
     down, across = (w / p for w, p in zip(frame.working, frame.picture, strict=True))
     left = min(round(x0 * across), window.shape[1] - 1)
     right = max(round(x1 * across), left + 1)
-    centre = int((top + glass.scope[3]) / 2 * down)
-    profile = window[centre : round(bottom * down), left:right].mean(axis=1)
+    centre = int((top + low) / 2 * down)
+    profile = window[centre : round(tile.scope[3] * down), left:right].mean(axis=1)
     if not len(profile) or profile[0] < LEAST:
-        return tile
-    border = round((centre + expected_length(profile)) / down)
-    border = int(min(max(border, top + 1), bottom))
-    lower = replace(railing, scope=(x0, float(border), x1, bottom))
-    upper = replace(glass, scope=(x0, top, x1, float(border)))
-    return replace(tile, children=(lower, upper))
+        return None
+    return (centre + expected_length(profile)) / down
 
 
 def expected_length(profile: NDArray[np.float32]) -> float:

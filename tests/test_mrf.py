@@ -229,6 +229,13 @@ def test_whole_rows_say_the_period_where_their_profile_misleads():
     assert storey_period(halved, np.zeros((210, 60), np.float32)) == pytest.approx(15, abs=1)
 
 
+def test_rows_that_hardly_agree_say_no_period():
+    faint = np.random.default_rng(0).normal(size=(210, 400)).astype(np.float32)
+    assert whole_period(faint) is None
+    rows = np.sin(np.arange(210) * 2 * np.pi / 29)
+    assert storey_period(rows, faint) == pytest.approx(29, abs=1)
+
+
 def over_a_shop(shop: np.ndarray, ground: int) -> tuple[np.ndarray, list[Band]]:
     """Four floors of 30 cells over a shop (rows of evidence, 60 columns) cut at `ground`."""
     plane = np.concatenate([pattern(4, 30), shop])

@@ -16,6 +16,7 @@ HALF_PEAK = 0.2  # and one at half its lag from this share: two storeys were tak
 SPREAD = (2.0, 1.5)  # pixels along and across rows: windows of two storeys are not alike to a pixel
 FAINT = 0.5  # of the median row's length: rows of a plain wall agree less
 CLEAR = 0.7  # a peak of the whole rows' correlation counts from this share of the highest
+LEAST = 0.12  # correlation; with less, windows of the storeys do not stand over one another
 ALIKE = 0.15  # logarithm of the ratio of two periods that are the same
 
 
@@ -56,7 +57,10 @@ def period(rows: Floats) -> float:
 
 
 def whole_period(plane: NDArray[np.float32]) -> float | None:
-    """Return the first clear lag at which whole rows of a plane correlate best; None: nowhere."""
+    """Return the first clear lag at which whole rows of a plane correlate best.
+
+    None where they hardly do at any.
+    """
     calm = cv2.GaussianBlur(plane, (0, 0), sigmaX=SPREAD[0], sigmaY=SPREAD[1]).astype(np.float64)
     length = np.sqrt((calm**2).sum(axis=1, keepdims=True))
     scaled = calm / (length + FAINT * float(np.median(length)) + 1e-9)
@@ -67,9 +71,10 @@ def whole_period(plane: NDArray[np.float32]) -> float | None:
     norms = np.sqrt((sums[n] - sums[lags]) * sums[n - lags])
     values = np.array([np.trace(products, lag) for lag in lags]) / (norms + 1e-9)
     peaks = _peaks(values)
-    if len(peaks) == 0:
+    best = values[peaks].max(initial=0.0)
+    if best < LEAST:
         return None
-    return float(lags[peaks[values[peaks] > CLEAR * values[peaks].max()][0]])
+    return float(lags[peaks[values[peaks] > CLEAR * best][0]])
 
 
 def _lags(n: int) -> NDArray[np.int64]:

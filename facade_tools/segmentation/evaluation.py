@@ -14,7 +14,7 @@ from ..artifacts.parse import LABELS, Region
 Boxes = NDArray[np.float64]  # (n, 4) x0, y0, x1, y1, half-open pixels
 
 WINDOW, SKY, CHIMNEY = LABELS.index("window"), LABELS.index("sky"), LABELS.index("chimney")
-LEAST_AREA, LEAST_SIDE = 20, 2  # pixels of a component that counts as a window
+LEAST_AREA = 30  # pixels of a component that counts as a window
 SAME = 0.5  # IoU of a window that is found
 
 
@@ -28,13 +28,14 @@ def confusion(truth: NDArray[np.uint8], found: NDArray[np.uint8]) -> NDArray[np.
 def boxes_of_labels(labels: NDArray[np.uint8]) -> Boxes:
     """Return the bounding boxes of the connected components of window pixels.
 
-    Annotated rectangles that lie on each other leave lines one pixel wide, which are no windows.
+    Annotated rectangles that lie on each other leave lines one pixel high, some 25 pixels long,
+    which are no windows.
     """
     mask = (labels == WINDOW).astype(np.uint8)
     _, _, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=4)
     x, y, width, height, area = stats[1:].T
     boxes = np.stack([x, y, x + width, y + height], axis=1).astype(np.float64)
-    kept: Boxes = boxes[(area >= LEAST_AREA) & (np.minimum(width, height) >= LEAST_SIDE)]
+    kept: Boxes = boxes[area >= LEAST_AREA]
     return kept
 
 

@@ -65,8 +65,9 @@ def measure(pair, classifier, plans, walks, tallies, times):
             times[f"{solver} {name} energy"].append(solution.energy)
             frame = Frame(working.shape[:2], shape)
             tree = derivation(made, solution.layout, frame)
-            planes = dict(zip(classifier.classes, belief, strict=True))
-            tree = cut_railings(tree, made.grammar, planes, frame)
+            tree = cut_railings(
+                tree, made.grammar, belief[classifier.classes.index("window")], frame
+            )
             labels = painted(tree, shape, label_index())
             key = f"{solver} {name}"
             tallies[key].add(pair.labels, labels, truth, boxes_of_regions(regions_of(tree)))

@@ -49,7 +49,7 @@ def border(tree):
 
 
 def cut(rows, symbol="FL", grammar="haussmann-floors"):
-    return cut_railings(facade(symbol), builtin(grammar), {"window": window_plane(rows)}, FRAME)
+    return cut_railings(facade(symbol), builtin(grammar), window_plane(rows), FRAME)
 
 
 def test_a_certain_border_is_found():
@@ -93,7 +93,7 @@ def test_tiles_that_touch_share_the_top_of_their_railing():
     plane = np.zeros((20, 10), np.float32)
     for (low, high), last in {(0, 3): 10, (4, 6): 14, (7, 10): 15}.items():
         plane[4:last, low:high] = 0.9
-    tree = cut_railings(row, builtin("haussmann-floors"), {"window": plane}, FRAME)
+    tree = cut_railings(row, builtin("haussmann-floors"), plane, FRAME)
     tops = [tile.children[0].scope[1] for tile in tree.children if tile.children]
     assert tops == [24, 24, 24, 30]
     assert all(tile.children[1].scope[3] == top for tile, top in
@@ -102,12 +102,21 @@ def test_tiles_that_touch_share_the_top_of_their_railing():
 
 def test_without_belief_in_windows_nothing_changes():
     assert cut({}) == facade()
-    assert cut_railings(facade(), builtin("haussmann-floors"), {}, FRAME) == facade()
+
+
+def test_what_is_hidden_says_nothing():
+    certain = window_plane(dict.fromkeys(range(4, 9), 0.9))
+    post, car = certain.copy(), certain.copy()
+    post[:, 2:5] = np.nan
+    car[10:] = np.nan
+    grammar = builtin("haussmann-floors")
+    assert border(cut_railings(facade(), grammar, post, FRAME)) == 18
+    assert cut_railings(facade(), grammar, car, FRAME) == facade()
 
 
 @given(arrays(np.float32, (20, 10), elements=st.floats(0, 1, width=32)))
 def test_regions_tile_whatever_is_believed(plane):
-    tree = cut_railings(facade(), builtin("haussmann-floors"), {"window": plane}, FRAME)
+    tree = cut_railings(facade(), builtin("haussmann-floors"), plane, FRAME)
     canvas = np.zeros((40, 20), int)
     for region in regions_of(tree):
         canvas[region.y0 : region.y1, region.x0 : region.x1] += 1

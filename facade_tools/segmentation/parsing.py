@@ -26,7 +26,7 @@ from .classifier import Classifier, default
 from .classifier import load as load_classifier
 from .deriving import Frame, derivation, floors_of, regions_of, with_confidence
 from .energy import Field, field_of
-from .railings import cut_railings
+from .railings import WINDOW, cut_railings
 
 IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -82,14 +82,16 @@ def read_facade(
     belief = reader.classifier.probabilities(working)
     shape = photo.pixels.shape[:2]
     raw = raw_labels(belief, reader.classifier.classes, shape)
-    if mask is not None:
-        belief = _blinded(belief, mask, shape)
+    hidden = _hidden(mask, working.shape[:2], shape)
+    belief = np.where(hidden, np.float32(1), belief)
     field = field_of(belief, reader.classifier.classes, reader.plan)
     solution = SOLVERS[reader.solver](field, reader.plan, rng)
     frame = Frame(working.shape[:2], shape)
     planes = dict(zip(reader.classifier.classes, belief, strict=True))
     tree = derivation(reader.plan, solution.layout, frame)
-    tree = cut_railings(tree, reader.plan.grammar, planes, frame)
+    if WINDOW in planes:
+        window = np.where(hidden, np.float32(np.nan), planes[WINDOW])
+        tree = cut_railings(tree, reader.plan.grammar, window, frame)
     regions = with_confidence(regions_of(tree), planes, frame)
     floors = floors_of(tree)
     parse = Parse(
@@ -135,13 +137,17 @@ def _index(name: str) -> int:
     return LABELS.index(name)
 
 
-def _blinded(
-    belief: Probabilities, mask: NDArray[np.bool_], shape: tuple[int, int]
-) -> Probabilities:
+def _hidden(
+    mask: NDArray[np.bool_] | None, working: tuple[int, ...], shape: tuple[int, ...]
+) -> NDArray[np.bool_]:
+    """Return where an occluder hides the facade at working size: nowhere without a mask."""
+    if mask is None:
+        return np.zeros(working, np.bool_)
     if mask.shape != shape:
         raise InvalidInput(
             f"the mask has {mask.shape[1]}×{mask.shape[0]} pixels, the picture other"
         )
-    height, width = belief.shape[1:]
-    area = cv2.resize(mask.astype(np.float32), (width, height), interpolation=cv2.INTER_AREA)
-    return np.where(area > 0.5, np.float32(1.0), belief).astype(np.float32)
+    size = (working[1], working[0])
+    area = cv2.resize(mask.astype(np.float32), size, interpolation=cv2.INTER_AREA)
+    covered: NDArray[np.bool_] = area > 0.5
+    return covered

@@ -7,7 +7,7 @@ of the border is nearer to either reading than the likelier of the two.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import groupby
 
@@ -23,20 +23,21 @@ WINDOW, RAILING = "window", "balcony"
 LEAST = 1e-3  # belief in a window at its centre: less says nothing
 
 
-def cut_railings(tree: Node, grammar: Grammar, belief: Mapping[str, Plane], frame: Frame) -> Node:
+def cut_railings(tree: Node, grammar: Grammar, window: Plane, frame: Frame) -> Node:
     """Return the derivation with the railings before windows cut each for itself.
 
-    belief: a plane (height, width) of every label at working resolution, top row first. Only tiles
-    of rows that derive each for itself change, and only the border inside them. Tiles that touch
-    share their railing, and its top: the mean of what is expected before each of their windows.
+    window: belief in windows at working resolution (height, width), top row first, NaN where
+    something hides the facade. Only tiles of rows that derive each for itself change, and only the
+    border inside them. Tiles that touch share their railing, and its top: the mean of what is
+    expected before each of their windows.
     """
-    if WINDOW not in belief or not tree.children:
+    if not tree.children:
         return tree
     rule = grammar.rules.get(tree.symbol)
     each = rule is not None and grammar.rules[rule.like or tree.symbol].derive == "each"
     if each and tree.split == "right":
-        return replace(tree, children=tuple(_row(tree.children, belief[WINDOW], frame)))
-    children = tuple(cut_railings(child, grammar, belief, frame) for child in tree.children)
+        return replace(tree, children=tuple(_row(tree.children, window, frame)))
+    children = tuple(cut_railings(child, grammar, window, frame) for child in tree.children)
     return replace(tree, children=children)
 
 
@@ -72,7 +73,7 @@ def _with_border(tile: Node, border: float) -> Node:
 def expected_border(tile: Node, window: Plane, frame: Frame) -> float | None:
     """Return where a tile's window is expected to end, pixels of the picture.
 
-    None where it holds no window, or belief says nothing of it.
+    None where it holds no window, or belief says nothing of it, or a row of it is hidden.
     """
     glass = tile.children[1]
     if glass.label != WINDOW:
@@ -82,13 +83,18 @@ def expected_border(tile: Node, window: Plane, frame: Frame) -> float | None:
     left = min(round(x0 * across), window.shape[1] - 1)
     right = max(round(x1 * across), left + 1)
     centre = int((top + low) / 2 * down)
-    profile = window[centre : round(tile.scope[3] * down), left:right].mean(axis=1)
-    if not len(profile) or profile[0] < LEAST:
+    strip = window[centre : round(tile.scope[3] * down), left:right]
+    seen = np.isfinite(strip)
+    count = seen.sum(axis=1)
+    if not len(strip) or not count.all():
+        return None
+    profile = np.where(seen, strip, 0).sum(axis=1) / count
+    if profile[0] < LEAST:
         return None
     return (centre + expected_length(profile)) / down
 
 
-def expected_length(profile: NDArray[np.float32]) -> float:
+def expected_length(profile: NDArray[np.floating]) -> float:
     """Return how many rows from the first on are expected to belong together.
 
     profile: belief of each row; a row belongs where all before it do, the first surely.

@@ -23,13 +23,14 @@ from facade_tools.grammar.plan import plan
 from facade_tools.grammar.reading import label_index
 from facade_tools.randomness import item_generator
 from facade_tools.segmentation import dp, walk
+from facade_tools.segmentation.bare_roofs import Seen
 from facade_tools.segmentation.classifier import load, save
 from facade_tools.segmentation.conventions import convention
-from facade_tools.segmentation.deriving import Frame, derivation, regions_of
+from facade_tools.segmentation.deriving import Frame, regions_of
 from facade_tools.segmentation.energy import field_of
 from facade_tools.segmentation.evaluation import Tally, boxes_of_labels, boxes_of_regions
+from facade_tools.segmentation.finishing import finished
 from facade_tools.segmentation.parsing import raw_labels
-from facade_tools.segmentation.railings import cut_railings
 from facade_tools.segmentation.training import TrainOptions, read_pairs, train
 
 GRAMMARS = ("haussmann", "haussmann-floors")
@@ -64,10 +65,8 @@ def measure(pair, classifier, plans, walks, tallies, times):
             times[f"{solver} {name}"].append(time.process_time() - start)
             times[f"{solver} {name} energy"].append(solution.energy)
             frame = Frame(working.shape[:2], shape)
-            tree = derivation(made, solution.layout, frame)
-            tree = cut_railings(
-                tree, made.grammar, belief[classifier.classes.index("window")], frame
-            )
+            seen = Seen(belief, classifier.classes, np.zeros(belief.shape[1:], bool))
+            tree = finished(made, solution.layout, seen, frame, solve)
             labels = painted(tree, shape, label_index())
             key = f"{solver} {name}"
             tallies[key].add(pair.labels, labels, truth, boxes_of_regions(regions_of(tree)))

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
+
 from ..artifacts.grammar import Grammar, Rule, Size
 from ..errors import InvalidInput
 from .expressions import parse, symbols
@@ -46,3 +49,40 @@ def _check_like(grammar: Grammar, rule: Rule, pointer: str) -> None:
     if other is None or other.split != rule.split or other.like is not None:
         message = f"{rule.like!r} is no {rule.split} rule with parameters of its own"
         raise InvalidInput(message, pointer=pointer)
+
+
+def symbols_below(grammar: Grammar, symbol: str) -> set[str]:
+    """Return the symbols that a shape can be made of, itself among them."""
+    found: set[str] = set()
+    waiting = [symbol]
+    while waiting:
+        name = waiting.pop()
+        if name not in found:
+            found.add(name)
+            waiting += _parts(grammar, name)
+    return found
+
+
+def grammar_below(grammar: Grammar, symbol: str, share: float) -> Grammar:
+    """Return the grammar of one of the shapes; share: its height over the axiom's.
+
+    Sizes become shares of the shape's height, so that they bind as before.
+    """
+    names = symbols_below(grammar, symbol)
+    leaders = {rule.like for name in names if (rule := grammar.rules.get(name)) and rule.like}
+    kept = names.union(*(symbols_below(grammar, leader) for leader in leaders))
+    rules = {name: _scaled(rule, 1 / share) for name, rule in grammar.rules.items() if name in kept}
+    return replace(grammar, axiom=symbol, rules=rules)
+
+
+def _parts(grammar: Grammar, symbol: str) -> Iterator[str]:
+    if symbol in grammar.rules:
+        yield from symbols(parse(grammar.rules[symbol].into))
+
+
+def _scaled(rule: Rule, factor: float) -> Rule:
+    def scaled(size: Size) -> Size:
+        typical, spread = (None if v is None else v * factor for v in (size.typical, size.spread))
+        return Size(size.min * factor, size.max * factor, typical, spread, size.weight)
+
+    return replace(rule, sizes={part: scaled(size) for part, size in rule.sizes.items()})

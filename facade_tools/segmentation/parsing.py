@@ -22,11 +22,12 @@ from ..grammar.reading import Method, Reading, ReadOptions, label_index
 from ..imaging.features_context import Probabilities
 from ..imaging.image_io import Photo
 from . import dp, walk
+from .bare_roofs import Seen
 from .classifier import Classifier, default
 from .classifier import load as load_classifier
-from .deriving import Frame, derivation, floors_of, regions_of, with_confidence
-from .energy import Field, field_of
-from .railings import WINDOW, cut_railings
+from .deriving import Frame, floors_of, regions_of, with_confidence
+from .energy import field_of
+from .finishing import finished
 
 IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -41,10 +42,10 @@ class Reader:
     name: str = "default"
 
 
-Solver = Callable[[Field, Plan, np.random.Generator], dp.Solution]
+Solver = Callable[..., dp.Solution]  # of a field and a plan, with rng
 
 SOLVERS: Mapping[str, Solver] = {
-    "dp": lambda field, plan, _: dp.solve(field, plan),
+    "dp": lambda field, plan, rng: dp.solve(field, plan),
     "walk": lambda field, plan, rng: walk.solve(field, plan, rng=rng),
 }
 
@@ -85,13 +86,12 @@ def read_facade(
     hidden = _hidden(mask, working.shape[:2], shape)
     belief = np.where(hidden, np.float32(1), belief)
     field = field_of(belief, reader.classifier.classes, reader.plan)
-    solution = SOLVERS[reader.solver](field, reader.plan, rng)
+    solve = partial(SOLVERS[reader.solver], rng=rng)
+    solution = solve(field, reader.plan)
     frame = Frame(working.shape[:2], shape)
     planes = dict(zip(reader.classifier.classes, belief, strict=True))
-    tree = derivation(reader.plan, solution.layout, frame)
-    if WINDOW in planes:
-        window = np.where(hidden, np.float32(np.nan), planes[WINDOW])
-        tree = cut_railings(tree, reader.plan.grammar, window, frame)
+    seen = Seen(belief, reader.classifier.classes, hidden)
+    tree = finished(reader.plan, solution.layout, seen, frame, solve)
     regions = with_confidence(regions_of(tree), planes, frame)
     floors = floors_of(tree)
     parse = Parse(

@@ -1,0 +1,122 @@
+"""Dormers of roofs that a parse leaves bare.
+
+A belief in single pixels is small where dormers are pale, and sums of pixels say no; but a row of
+dormers is there or it is not. If the roof has some, the odds of windows are higher by what made
+the classifier doubt. So the roof alone is read again with windows favoured more and more, and a
+row of dormers that comes to stand is kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..artifacts.grammar import Grammar, Node
+from ..errors import Infeasible
+from ..grammar.derivation import leaves, nodes
+from ..grammar.plan import Plan, plan
+from ..grammar.rules import grammar_below, symbols_below
+from ..imaging.features_context import Probabilities
+from .deriving import Frame, derivation
+from .dp import Solution
+from .energy import Field, field_of
+
+Solve = Callable[[Field, Plan], Solution]
+
+ROOF, WINDOW = "roof", "window"
+FAVOURS = (4.0, 8.0, 16.0)  # factors of the odds of windows, tried in turn
+ENOUGH = 0.5  # more dormers than this share of the highest floor's windows are a row
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What a classifier believes of a picture at working resolution, top row first.
+
+    belief: (classes, height, width). hidden: (height, width), where every label is as good.
+    """
+
+    belief: Probabilities
+    classes: Sequence[str]
+    hidden: NDArray[np.bool_]
+
+
+def with_dormers(tree: Node, grammar: Grammar, seen: Seen, frame: Frame, solve: Solve) -> Node:
+    """Return the derivation with dormers in roofs where it has none and the belief allows a row.
+
+    Roofs whose windows would stand in the columns of other rows are left alone.
+    """
+    usual = highest_windows(tree)
+    if not usual:
+        return tree
+
+    def visited(node: Node) -> Node:
+        if node.children and _is_bare(node, grammar):
+            return _dormers(node, grammar, seen, frame, solve, usual) or node
+        return replace(node, children=tuple(visited(child) for child in node.children))
+
+    return visited(tree)
+
+
+def highest_windows(tree: Node) -> int:
+    """Return the number of windows of the highest floor that has some, 0 where none has."""
+    counts = [_windows(node) for node in nodes(tree) if node.split == "right"]
+    return next((count for count in reversed(counts) if count), 0)
+
+
+def _windows(row: Node) -> int:
+    """Return how many tiles of a row hold a window."""
+    return sum(any(leaf.label == WINDOW for leaf in leaves(tile)) for tile in row.children)
+
+
+def _is_bare(node: Node, grammar: Grammar) -> bool:
+    """Return whether a shape is roof alone, but might have had windows of its own."""
+    if any(leaf.label != ROOF for leaf in leaves(node)):
+        return False
+    names = symbols_below(grammar, node.symbol)
+    if not any(grammar.terminals.get(name) == WINDOW for name in names):
+        return False
+    leaders = {grammar.rules[name].like for name in names & grammar.rules.keys()} - {None, *names}
+    return all(grammar.rules[leader].derive == "each" for leader in leaders if leader)
+
+
+def _dormers(
+    roof: Node, grammar: Grammar, seen: Seen, frame: Frame, solve: Solve, usual: int
+) -> Node | None:
+    """Return the roof with the first row of dormers that stands, None where none does."""
+    y0, y1 = (round(y) for y in roof.scope[1::2])
+    scale = frame.working[0] / frame.picture[0]
+    top, foot = round(y0 * scale), round(y1 * scale)
+    if foot <= top:
+        return None
+    part = plan(grammar_below(grammar, roof.symbol, (foot - top) / frame.working[0]))
+    own = Frame((foot - top, frame.working[1]), (y1 - y0, frame.picture[1]))
+    for favour in FAVOURS:
+        belief = favoured(seen.belief[:, top:foot], seen.classes.index(WINDOW), favour)
+        belief[:, seen.hidden[top:foot]] = 1
+        try:
+            solution = solve(field_of(belief, seen.classes, part), part)
+        except Infeasible:
+            return None
+        tree = derivation(part, solution.layout, own)
+        rows = [_windows(node) for node in nodes(tree) if node.split == "right"]
+        if max(rows, default=0) > ENOUGH * usual:
+            return _lowered(tree, y0)
+    return None
+
+
+def favoured(belief: Probabilities, index: int, favour: float) -> Probabilities:
+    """Return the belief with the odds of class `index` against all others times `favour`."""
+    out = belief.copy()
+    out[index] *= np.float32(favour)
+    out /= out.sum(axis=0)
+    return out
+
+
+def _lowered(node: Node, by: int) -> Node:
+    """Return a tree in a picture that has `by` more rows above it."""
+    x0, y0, x1, y1 = node.scope
+    children = tuple(_lowered(child, by) for child in node.children)
+    return replace(node, scope=(x0, y0 + by, x1, y1 + by), children=children)

@@ -31,7 +31,7 @@ from facade_tools.segmentation.energy import field_of
 from facade_tools.segmentation.evaluation import Tally, boxes_of_labels, boxes_of_regions
 from facade_tools.segmentation.finishing import finished
 from facade_tools.segmentation.parsing import raw_labels
-from facade_tools.segmentation.training import TrainOptions, read_pairs, train
+from facade_tools.segmentation.training import TrainOptions, load_start, read_pairs, train
 
 GRAMMARS = ("haussmann", "haussmann-floors")
 
@@ -80,6 +80,7 @@ def main():
     parser.add_argument("--only", type=int, nargs="*", help="these folds alone")
     parser.add_argument("--features", default="context")
     parser.add_argument("--classifier", help="test this one on everything instead of training")
+    parser.add_argument("--start", help="classifier of other pictures whose networks go on")
     parser.add_argument("--work", type=Path, default=Path("build/facade_parsing"))
     parser.add_argument("--no-walk", action="store_true")
     parser.add_argument("--grammars", nargs="*", default=GRAMMARS, help="none: pixels alone")
@@ -91,7 +92,8 @@ def main():
     pairs = list(read_pairs(images, labels, convention(args.convention)))
     pairs = pairs[:: max(1, len(pairs) // args.limit)][: args.limit]
     folds = item_generator(0, "folds").permutation(len(pairs)) % args.folds
-    options = replace(TrainOptions(), features=args.features)
+    start = load_start(args.start) if args.start else None
+    options = replace(TrainOptions(), features=args.features, start=start)
     plans = {name: plan(builtin(name)) for name in args.grammars}
     solvers = ("dp",) if args.no_walk else ("dp", "walk")
     keys = ["raw", *(f"{s} {g}" for s in solvers for g in args.grammars)]

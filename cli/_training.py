@@ -16,7 +16,7 @@ from facade_tools.segmentation.classifier import save
 from facade_tools.segmentation.conventions import convention
 from facade_tools.segmentation.network_training import NetworkOptions
 from facade_tools.segmentation.patches import ForestOptions
-from facade_tools.segmentation.training import TrainOptions, read_pairs, train
+from facade_tools.segmentation.training import TrainOptions, load_start, read_pairs, train
 
 
 def run_training(
@@ -25,13 +25,14 @@ def run_training(
     """Read the pairs, train, write the npz."""
     if output is None:
         raise click.UsageError("Missing option '-o': name a .npz file.")
+    start = None if values["start"] is None else load_start(values["start"])
     options = TrainOptions(
         features=values["features"], stages=values["stages"], height=values["height"],
         coarse=min(values["coarse"], values["height"]),
         pixels=values["pixels"], augment=values["augment"], balance=values["balance"],
         boost=BoostOptions(rounds=values["rounds"]),
         forest=ForestOptions(values["trees"], values["depth"], values["patch"]),
-        network=NetworkOptions(steps=values["steps"]),
+        network=NetworkOptions(steps=values["steps"]), start=start,
     )  # fmt: skip
     pairs = list(read_pairs(images, labels, convention(values["classes"])))
     data = save(train(pairs, options, rng=item_generator(seed, "train-parser")))

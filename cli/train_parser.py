@@ -36,6 +36,8 @@ from . import _options
               help="0 weighs pixels equally, 1 classes.")  # fmt: skip
 @click.option("--steps", type=click.IntRange(0, 10**6), default=2500, show_default=True,
               help="Views that train the network beside the trees; 0: trees alone.")  # fmt: skip
+@click.option("--start", metavar="NPZ",
+              help="Classifier of other pictures whose network goes on here.")  # fmt: skip
 @click.option("--trees", type=click.IntRange(1, 500), default=10, show_default=True,
               help="Trees of the patch forest.")  # fmt: skip
 @click.option("--depth", type=click.IntRange(1, 30), default=18, show_default=True,

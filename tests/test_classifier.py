@@ -318,3 +318,7 @@ def test_train_parser_end_to_end(facade, pairs, tmp_path):
     assert isinstance(decoded(out.read_bytes()), Classifier)
     missing = facade("train-parser", tmp_path, tmp_path / "labels", "-o", out)
     assert missing.returncode == 3
+    start = ("--start", out)
+    bare = facade("train-parser", tmp_path / "images", tmp_path / "labels", *start, "-o", out)
+    assert bare.returncode == 3
+    assert b"model.npz: holds no network to start from" in bare.stderr

@@ -22,6 +22,7 @@ from facade_tools.segmentation.network import (
     inputs,
     padded,
     pixels_of,
+    scores_for,
     shapes,
 )
 from facade_tools.segmentation.network_training import NetworkOptions, train_network
@@ -153,6 +154,30 @@ def test_training_is_deterministic(pairs, trained):
     again = train_network(pairs, 8, TINY, rng=np.random.default_rng(0))
     for name, array in trained.weights.items():
         np.testing.assert_array_equal(array, again.weights[name])
+
+
+def test_training_goes_on_from_another_network(pairs, trained):
+    short = replace(TINY, steps=30, rate=1e-3)
+    shares = []
+    for start in (None, trained):
+        network = train_network(pairs, 8, short, rng=np.random.default_rng(1), start=start)
+        found = [network.probabilities(picture).argmax(axis=0) + 1 for picture, _ in pairs]
+        right = [(f == known)[known > 0].mean() for f, (_, known) in zip(found, pairs, strict=True)]
+        shares.append(np.mean(right))
+    assert shares[1] > max(0.6, shares[0] + 0.1)
+
+
+def test_scores_follow_their_classes():
+    picture = np.random.default_rng(3).integers(0, 255, (48, 64, 3)).astype(np.uint8)
+    known = ("window", "wall", "door")
+    network = Network(WIDTHS, 3, random_weights())
+    before = dict(zip(known, network.probabilities(picture), strict=True))
+    again = scores_for(network, known, ("door", "roof", "window", "wall"))
+    assert again.weights["in1.kernel"] is network.weights["in1.kernel"]
+    after = again.probabilities(picture)
+    assert after.shape[0] == 4
+    kept = after[[2, 3, 0]] / (1 - after[1])
+    np.testing.assert_allclose(kept, [before[name] for name in known], atol=1e-5)
 
 
 def test_views_keep_pixels_and_labels_together():

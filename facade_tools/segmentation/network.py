@@ -7,7 +7,7 @@ from nothing (network_training.py) and applied with NumPy and one compiled loop.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -54,6 +54,20 @@ class Network:
         np.exp(scores, out=scores)
         scores /= scores.sum(axis=2, keepdims=True)
         return np.ascontiguousarray(scores.transpose(2, 0, 1))
+
+
+def scores_for(network: Network, known: Sequence[str], wanted: Sequence[str]) -> Network:
+    """Return a network of other classes: those it does not know start without a score."""
+    weights = dict(network.weights)
+    for name in ("scores.kernel", "scores.bias"):
+        array = weights[name]
+        parts = array.reshape(*array.shape[:-1], 4, len(known))
+        out = np.zeros((*parts.shape[:-1], len(wanted)), np.float32)
+        for k, label in enumerate(wanted):
+            if label in known:
+                out[..., k] = parts[..., known.index(label)]
+        weights[name] = out.reshape(*array.shape[:-1], -1)
+    return Network(network.widths, len(wanted), weights)
 
 
 def shapes(widths: tuple[int, int, int, int], classes: int) -> dict[str, tuple[int, ...]]:

@@ -63,10 +63,17 @@ def train_network(
     options: NetworkOptions,
     *,
     rng: np.random.Generator,
+    start: Network | None = None,
 ) -> Network:
-    """Return a network of `classes` classes; labels are 0 (ignored) or class + 1."""
+    """Return a network of `classes` classes; labels are 0 (ignored) or class + 1.
+
+    start: a network of these classes and widths to go on from; None: from random weights.
+    """
     step = _compiled_step(classes, options)
-    weights = _start(shapes(options.widths, classes), rng)
+    if start is None:
+        weights = _start(shapes(options.widths, classes), rng)
+    else:
+        weights = {name: array.copy() for name, array in start.weights.items()}
     nothing = {name: np.zeros_like(array) for name, array in weights.items()}
     state: State = (weights, nothing, dict(nothing), dict(weights))
     losses: list[Array] = []

@@ -18,8 +18,9 @@ from ..imaging.image_io import PICTURES, fitted, read_photo
 from .augmentation import varied
 from .autocontext import FINE, Example, Labels, example, train_stages
 from .boosting import BoostOptions, train_boosted
-from .classifier import MAX_PIXELS, Classifier
+from .classifier import MAX_PIXELS, Classifier, load
 from .conventions import Convention
+from .network import Network, scores_for
 from .network_training import NetworkOptions, train_network
 from .patches import ForestOptions, train_forest
 from .trees import Codes, Trees
@@ -36,6 +37,8 @@ class TrainOptions:
     stage. inner: folds by picture for the beliefs that later stages train on. augment: varied
     copies a picture. balance: 0 weighs pixels equally, 1 gives each class the same weight.
     early, boost: trees of all stages but the last two, and of these. network: beside the trees.
+    start: a classifier of other pictures whose network goes on here, if it has one; its trees
+    are not used.
     """
 
     features: str = "context"
@@ -50,6 +53,7 @@ class TrainOptions:
     boost: BoostOptions = field(default_factory=BoostOptions)
     forest: ForestOptions = field(default_factory=ForestOptions)
     network: NetworkOptions = field(default_factory=NetworkOptions)
+    start: Classifier | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,8 +83,19 @@ def read_pairs(images: str, labels: str, convention: Convention) -> Iterator[Pai
         yield Pair(path.stem, photo.pixels, known)
 
 
+def load_start(path: str) -> Classifier:
+    """Return a classifier that training can start from. Raises InvalidInput without a network."""
+    classifier = load(path)
+    if classifier.network is None:
+        raise InvalidInput("holds no network to start from").at(path)
+    return classifier
+
+
 def train(pairs: Sequence[Pair], options: TrainOptions, *, rng: np.random.Generator) -> Classifier:
-    """Return a classifier of the labels in `pairs`. Raises InvalidInput on fewer than two."""
+    """Return a classifier of the labels in `pairs`.
+
+    Raises InvalidInput on fewer than two.
+    """
     present = np.zeros(len(LABELS), np.bool_)
     small = []
     height = options.coarse if options.features == "patch" else options.height
@@ -113,9 +128,20 @@ def train(pairs: Sequence[Pair], options: TrainOptions, *, rng: np.random.Genera
     stages = train_stages(examples, fits, options.pixels, rng=rng)
     network = None
     if options.network.steps:
-        views = [(pair.picture, pair.labels) for pair in small]
-        network = train_network(views, len(classes), options.network, rng=own)
+        network = _network(small, classes, options, own)
     return Classifier("context", classes, stages, height, options.coarse, 0, about, fine, network)
+
+
+def _network(
+    pairs: Sequence[Pair], classes: Sequence[str], options: TrainOptions, rng: np.random.Generator
+) -> Network:
+    """Return the network of pairs at working size, gone on from another where options say so."""
+    views = [(pair.picture, pair.labels) for pair in pairs]
+    settings, known, start = options.network, options.start, None
+    if known is not None and known.network is not None:
+        start = scores_for(known.network, known.classes, classes)
+        settings = replace(settings, widths=start.widths)
+    return train_network(views, len(classes), settings, rng=rng, start=start)
 
 
 def _working(pair: Pair, height: int) -> Pair:

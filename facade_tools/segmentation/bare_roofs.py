@@ -27,7 +27,7 @@ from .energy import Field, field_of
 Solve = Callable[[Field, Plan], Solution]
 
 ROOF, WINDOW = "roof", "window"
-FAVOURS = (4.0, 8.0, 16.0)  # factors of the odds of windows, tried in turn
+FAVOURS = (4.0, 8.0)  # factors of the odds of windows, tried in turn
 ENOUGH = 0.5  # more dormers than this share of the highest floor's windows are a row
 
 

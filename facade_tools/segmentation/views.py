@@ -13,6 +13,10 @@ from .augmentation import relit
 from .autocontext import Labels
 
 Sizes = Sequence[tuple[int, int]]  # (height, width) of views, pixels
+Positions = NDArray[np.float64]
+
+DOWN, ACROSS = 0.35, 0.15  # spread of the logarithm of the scale along a view
+KNOTS = 8  # at which the scale along a view is drawn
 
 
 def random_view(
@@ -20,6 +24,7 @@ def random_view(
 ) -> tuple[Picture, Labels]:
     """Return a part of a picture: scale, perspective, mirror, light and occluder vary.
 
+    The scale also varies along the view: roofs and storeys become higher and lower than they are.
     It has the one of `sizes` that is nearest in shape. Labels of what hides a part, or lies outside
     of the picture, are 0.
     """
@@ -28,14 +33,11 @@ def random_view(
     aspect = np.log((part[3] - part[1]) * stretch[1] / ((part[2] - part[0]) * stretch[0]))
     height, width = min(sizes, key=lambda size: abs(np.log(size[0] / size[1]) - aspect))
     warp = _warp(part, (height, width), rng)
-
-    def seen(plane: Picture | Labels, flags: int, border: int) -> cv2.typing.MatLike:
-        return cv2.warpPerspective(
-            plane, warp, (width, height), flags=flags | cv2.WARP_INVERSE_MAP, borderMode=border
-        )
-
-    pixels = seen(picture, cv2.INTER_LINEAR, cv2.BORDER_REPLICATE).astype(np.uint8)
-    known = seen(labels, cv2.INTER_NEAREST, cv2.BORDER_CONSTANT).astype(np.uint8)
+    x, y = _uneven(width, ACROSS, rng), _uneven(height, DOWN, rng)
+    at = _positions(warp, x, y)
+    inside, outside = cv2.BORDER_REPLICATE, cv2.BORDER_CONSTANT
+    pixels = cv2.remap(picture, *at, cv2.INTER_LINEAR, borderMode=inside).astype(np.uint8)
+    known = cv2.remap(labels, *at, cv2.INTER_NEAREST, borderMode=outside).astype(np.uint8)
     pixels = relit(pixels, rng=rng)
     if rng.random() < 0.3:
         _hide(pixels, known, rng)
@@ -66,6 +68,25 @@ def _warp(
     height, width = size
     frame = np.array([[0, 0], [width, 0], [width, height], [0, height]], np.float32)
     return cv2.getPerspectiveTransform(frame, corners.astype(np.float32)).astype(np.float64)
+
+
+def _uneven(length: int, spread: float, rng: np.random.Generator) -> Positions:
+    """Return where the pixels of a side lie when it is stretched here and pressed there."""
+    logs = rng.normal(0, spread, KNOTS)
+    scale = np.exp(np.interp(np.linspace(0, KNOTS - 1, length), np.arange(KNOTS), logs))
+    borders = np.concatenate([[0], np.cumsum(scale)])
+    borders *= length / borders[-1]
+    middles: Positions = (borders[:-1] + borders[1:]) / 2
+    return middles - 0.5
+
+
+def _positions(
+    warp: NDArray[np.float64], x: Positions, y: Positions
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return the columns and the rows of the picture that a grid of a view shows."""
+    u, v = np.meshgrid(x, y)
+    across, down, along = (row[0] * u + row[1] * v + row[2] for row in warp)
+    return (across / along).astype(np.float32), (down / along).astype(np.float32)
 
 
 def _hide(picture: Picture, labels: Labels, rng: np.random.Generator) -> None:

@@ -23,10 +23,11 @@ from ..imaging.features_context import Probabilities
 from .deriving import Frame, derivation
 from .dp import Solution
 from .energy import Field, field_of
+from .railings import WINDOW
 
 Solve = Callable[[Field, Plan], Solution]
 
-ROOF, WINDOW = "roof", "window"
+ROOF = "roof"
 FAVOURS = (4.0, 8.0)  # factors of the odds of windows, tried in turn
 ENOUGH = 0.5  # more dormers than this share of the highest floor's windows are a row
 
@@ -49,15 +50,7 @@ def with_dormers(tree: Node, grammar: Grammar, seen: Seen, frame: Frame, solve: 
     Roofs whose windows would stand in the columns of other rows are left alone.
     """
     usual = highest_windows(tree)
-    if not usual:
-        return tree
-
-    def visited(node: Node) -> Node:
-        if node.children and _is_bare(node, grammar):
-            return _dormers(node, grammar, seen, frame, solve, usual) or node
-        return replace(node, children=tuple(visited(child) for child in node.children))
-
-    return visited(tree)
+    return _Roofs(grammar, seen, frame, solve, usual).visited(tree) if usual else tree
 
 
 def highest_windows(tree: Node) -> int:
@@ -82,29 +75,44 @@ def _is_bare(node: Node, grammar: Grammar) -> bool:
     return all(grammar.rules[leader].derive == "each" for leader in leaders if leader)
 
 
-def _dormers(
-    roof: Node, grammar: Grammar, seen: Seen, frame: Frame, solve: Solve, usual: int
-) -> Node | None:
-    """Return the roof with the first row of dormers that stands, None where none does."""
-    y0, y1 = (round(y) for y in roof.scope[1::2])
-    scale = frame.working[0] / frame.picture[0]
-    top, foot = round(y0 * scale), round(y1 * scale)
-    if foot <= top:
-        return None
-    part = plan(grammar_below(grammar, roof.symbol, (foot - top) / frame.working[0]))
-    own = Frame((foot - top, frame.working[1]), (y1 - y0, frame.picture[1]))
-    for favour in FAVOURS:
-        belief = favoured(seen.belief[:, top:foot], seen.classes.index(WINDOW), favour)
-        belief[:, seen.hidden[top:foot]] = 1
-        try:
-            solution = solve(field_of(belief, seen.classes, part), part)
-        except Infeasible:
+@dataclass(frozen=True, slots=True)
+class _Roofs:
+    """What reading the roofs of a derivation again needs. usual: windows of the highest floor."""
+
+    grammar: Grammar
+    seen: Seen
+    frame: Frame
+    solve: Solve
+    usual: int
+
+    def visited(self, node: Node) -> Node:
+        """Return a shape with dormers in the bare roofs below it."""
+        if node.children and _is_bare(node, self.grammar):
+            return self.dormers(node) or node
+        return replace(node, children=tuple(self.visited(child) for child in node.children))
+
+    def dormers(self, roof: Node) -> Node | None:
+        """Return the roof with the first row of dormers that stands, None where none does."""
+        y0, y1 = (round(y) for y in roof.scope[1::2])
+        height, width = self.frame.working
+        top, foot = (round(y * height / self.frame.picture[0]) for y in (y0, y1))
+        if foot <= top:
             return None
-        tree = derivation(part, solution.layout, own)
-        rows = [_windows(node) for node in nodes(tree) if node.split == "right"]
-        if max(rows, default=0) > ENOUGH * usual:
-            return _lowered(tree, y0)
-    return None
+        part = plan(grammar_below(self.grammar, roof.symbol, (foot - top) / height))
+        own = Frame((foot - top, width), (y1 - y0, self.frame.picture[1]))
+        window = self.seen.classes.index(WINDOW)
+        for favour in FAVOURS:
+            belief = favoured(self.seen.belief[:, top:foot], window, favour)
+            belief[:, self.seen.hidden[top:foot]] = 1
+            try:
+                solution = self.solve(field_of(belief, self.seen.classes, part), part)
+            except Infeasible:
+                return None
+            tree = derivation(part, solution.layout, own)
+            rows = [_windows(node) for node in nodes(tree) if node.split == "right"]
+            if max(rows, default=0) > ENOUGH * self.usual:
+                return _lowered(tree, y0)
+        return None
 
 
 def favoured(belief: Probabilities, index: int, favour: float) -> Probabilities:

@@ -92,10 +92,7 @@ def load_start(path: str) -> Classifier:
 
 
 def train(pairs: Sequence[Pair], options: TrainOptions, *, rng: np.random.Generator) -> Classifier:
-    """Return a classifier of the labels in `pairs`.
-
-    Raises InvalidInput on fewer than two.
-    """
+    """Return a classifier of the labels in `pairs`. Raises InvalidInput on fewer than two."""
     present = np.zeros(len(LABELS), np.bool_)
     small = []
     height = options.coarse if options.features == "patch" else options.height

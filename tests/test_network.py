@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from facade_tools.errors import InvalidInput
 from facade_tools.grammar.library import builtin
 from facade_tools.segmentation import network_training
-from facade_tools.segmentation.classifier import _arrays, decoded, default, save
+from facade_tools.segmentation.classifier import _arrays, _joined, decoded, default, save
 from facade_tools.segmentation.network import (
     MULTIPLE,
     Network,
@@ -163,6 +163,16 @@ def test_training_goes_on_from_another_network(pairs, trained):
     found = [network.probabilities(picture).argmax(axis=0) + 1 for picture, _ in pairs]
     right = [(f == known)[known > 0].mean() for f, (_, known) in zip(found, pairs, strict=True)]
     assert np.mean(right) > 0.6
+
+
+def test_what_trees_or_network_exclude_is_not_believed_in():
+    one = np.array([0.5, 0.5, 0.0], np.float32).reshape(3, 1, 1)
+    other = np.array([0.0, 0.8, 0.2], np.float32).reshape(3, 1, 1)
+    joined = _joined(one, other).ravel()
+    assert joined.sum() == pytest.approx(1, abs=1e-6)
+    expected = np.array([0.5, 0.5, 1e-4]) ** 0.4 * np.array([1e-4, 0.8, 0.2]) ** 0.6
+    np.testing.assert_allclose(joined, expected / expected.sum(), rtol=2e-3)
+    np.testing.assert_allclose(_joined(other, other), other, atol=2e-4)
 
 
 def test_scores_follow_their_classes():

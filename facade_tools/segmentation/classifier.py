@@ -33,6 +33,8 @@ MAX_PIXELS = 400_000  # at working resolution
 KINDS = ("context", "patch")
 NETWORK = "network."  # before the names of its arrays
 ZOOM = 1.18  # of the picture that the network sees
+TRUST = np.float32(0.6)  # in the network, the rest in the trees
+DOUBT = np.float32(1e-4)  # of any belief
 ALIKE = np.float32(0.1)  # what alike columns, and alike rows, count in a belief
 SMOOTH = 1 / 480  # of the working picture's rows
 
@@ -49,7 +51,7 @@ class Classifier:
     kind: `context` (features of the picture, then of the beliefs too) or `patch` (the paper's
     forest). height: rows of the working resolution. coarse: rows at which all stages but the last
     `fine` ones look at the picture. patch: side of the patches. about: free notes. network: what
-    is asked beside the stages of context, its belief counting as much as theirs.
+    is asked beside the stages of context; its belief counts a little more than theirs.
     """
 
     kind: str
@@ -80,20 +82,19 @@ class Classifier:
         return np.ascontiguousarray(shares.T).reshape(-1, *working.shape[:2])
 
     def _both_ways(self, working: Picture) -> Probabilities:
-        def believed(picture: Picture) -> Probabilities:
-            belief = run_stages(self.stages, picture, self.coarse, self.fine)
-            if self.network is None:
-                return belief
-            both: Probabilities = (belief + _zoomed(self.network, picture)) / np.float32(2)
-            return both
-
         mirrored = np.ascontiguousarray(working[:, ::-1])
         with ThreadPoolExecutor(2) as pool:  # compiled loops let go of the interpreter
-            one, other = pool.map(believed, (working, mirrored))
-        mean: Probabilities = (one + other[:, :, ::-1]) / np.float32(2)
+            one, other = pool.map(self._asked, (working, mirrored))
+        means = [(a + b[:, :, ::-1]) / np.float32(2) for a, b in zip(one, other, strict=True)]
+        belief = means[0] if len(means) == 1 else _agreed(_joined(*means))
+        return np.stack([blurred(plane, SMOOTH * len(plane)) for plane in belief])
+
+    def _asked(self, picture: Picture) -> list[Probabilities]:
+        """Return the belief of the stages, and that of the network if there is one."""
+        beliefs = [run_stages(self.stages, picture, self.coarse, self.fine)]
         if self.network is not None:
-            mean = _agreed(mean)
-        return np.stack([blurred(plane, SMOOTH * len(plane)) for plane in mean])
+            beliefs.append(_zoomed(self.network, picture))
+        return beliefs
 
 
 def _zoomed(network: Network, picture: Picture) -> Probabilities:
@@ -102,6 +103,14 @@ def _zoomed(network: Network, picture: Picture) -> Probabilities:
     large = (round(width * ZOOM), round(height * ZOOM))
     seen = cv2.resize(picture, large, interpolation=cv2.INTER_LINEAR).astype(np.uint8)
     return np.stack([cv2.resize(p, (width, height)) for p in network.probabilities(seen)])
+
+
+def _joined(trees: Probabilities, network: Probabilities) -> Probabilities:
+    """Return the geometric mean of two beliefs: what either excludes is not believed in."""
+    logs = (1 - TRUST) * np.log(trees + DOUBT) + TRUST * np.log(network + DOUBT)
+    mean: Probabilities = np.exp(logs)
+    mean /= mean.sum(axis=0)
+    return mean
 
 
 def _agreed(belief: Probabilities) -> Probabilities:

@@ -30,6 +30,7 @@ Solve = Callable[[Field, Plan], Solution]
 ROOF = "roof"
 FAVOURS = (4.0, 8.0)  # factors of the odds of windows, tried in turn
 ENOUGH = 0.5  # more dormers than this share of the highest floor's windows are a row
+WIDEST = 1.5  # widths of the highest floor's windows; what is wider is a banner or a skylight
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,15 +54,19 @@ def with_dormers(tree: Node, grammar: Grammar, seen: Seen, frame: Frame, solve: 
     return _Roofs(grammar, seen, frame, solve, usual).visited(tree) if usual else tree
 
 
-def highest_windows(tree: Node) -> int:
-    """Return the number of windows of the highest floor that has some, 0 where none has."""
-    counts = [_windows(node) for node in nodes(tree) if node.split == "right"]
-    return next((count for count in reversed(counts) if count), 0)
+def highest_windows(tree: Node) -> list[float]:
+    """Return the widths of the windows of the highest floor that has some."""
+    rows = [_windows(node) for node in nodes(tree) if node.split == "right"]
+    return next((row for row in reversed(rows) if row), [])
 
 
-def _windows(row: Node) -> int:
-    """Return how many tiles of a row hold a window."""
-    return sum(any(leaf.label == WINDOW for leaf in leaves(tile)) for tile in row.children)
+def _windows(row: Node) -> list[float]:
+    """Return the widths of the tiles of a row that hold a window, pixels of the picture."""
+    return [
+        tile.scope[2] - tile.scope[0]
+        for tile in row.children
+        if any(leaf.label == WINDOW for leaf in leaves(tile))
+    ]
 
 
 def _is_bare(node: Node, grammar: Grammar) -> bool:
@@ -77,13 +82,13 @@ def _is_bare(node: Node, grammar: Grammar) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class _Roofs:
-    """What reading the roofs of a derivation again needs. usual: windows of the highest floor."""
+    """What reading the roofs again needs. usual: widths of the highest floor's windows."""
 
     grammar: Grammar
     seen: Seen
     frame: Frame
     solve: Solve
-    usual: int
+    usual: list[float]
 
     def visited(self, node: Node) -> Node:
         """Return a shape with dormers in the bare roofs below it."""
@@ -110,9 +115,14 @@ class _Roofs:
                 return None
             tree = derivation(part, solution.layout, own)
             rows = [_windows(node) for node in nodes(tree) if node.split == "right"]
-            if max(rows, default=0) > ENOUGH * self.usual:
+            if self.stands(max(rows, key=len, default=[])):
                 return _lowered(tree, y0)
         return None
+
+    def stands(self, dormers: list[float]) -> bool:
+        """Return whether dormers of these widths are a row above the floors."""
+        many = len(dormers) > ENOUGH * len(self.usual)
+        return many and max(dormers) <= WIDEST * float(np.median(self.usual))
 
 
 def favoured(belief: Probabilities, index: int, favour: float) -> Probabilities:

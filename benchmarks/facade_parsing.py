@@ -34,6 +34,12 @@ from facade_tools.segmentation.parsing import raw_labels
 from facade_tools.segmentation.training import TrainOptions, load_start, read_pairs, train
 
 GRAMMARS = ("haussmann", "haussmann-floors")
+FOLDS = 5
+
+
+def folds_of(pairs, folds):
+    """Return the fold of every picture."""
+    return item_generator(0, "folds").permutation(len(pairs)) % folds
 
 
 def trained(path, pairs, options, fold):
@@ -76,7 +82,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("data", type=Path)
     parser.add_argument("--convention", default="ecp")
-    parser.add_argument("--folds", type=int, default=5)
+    parser.add_argument("--folds", type=int, default=FOLDS)
     parser.add_argument("--only", type=int, nargs="*", help="these folds alone")
     parser.add_argument("--features", default="context")
     parser.add_argument("--classifier", help="test this one on everything instead of training")
@@ -91,7 +97,7 @@ def main():
     images, labels = str(args.data / "images"), str(args.data / "labels")
     pairs = list(read_pairs(images, labels, convention(args.convention)))
     pairs = pairs[:: max(1, len(pairs) // args.limit)][: args.limit]
-    folds = item_generator(0, "folds").permutation(len(pairs)) % args.folds
+    folds = folds_of(pairs, args.folds)
     start = load_start(args.start) if args.start else None
     options = replace(TrainOptions(), features=args.features, start=start)
     plans = {name: plan(builtin(name)) for name in args.grammars}

@@ -170,7 +170,7 @@ def test_what_trees_or_network_exclude_is_not_believed_in():
     other = np.array([0.0, 0.8, 0.2], np.float32).reshape(3, 1, 1)
     joined = _joined(one, other).ravel()
     assert joined.sum() == pytest.approx(1, abs=1e-6)
-    expected = np.array([0.5, 0.5, 1e-4]) ** 0.4 * np.array([1e-4, 0.8, 0.2]) ** 0.6
+    expected = np.array([0.5, 0.5, 1e-4]) ** 0.3 * np.array([1e-4, 0.8, 0.2]) ** 0.7
     np.testing.assert_allclose(joined, expected / expected.sum(), rtol=2e-3)
     np.testing.assert_allclose(_joined(other, other), other, atol=2e-4)
 

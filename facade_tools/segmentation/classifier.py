@@ -33,7 +33,7 @@ MAX_PIXELS = 400_000  # at working resolution
 KINDS = ("context", "patch")
 NETWORK = "network."  # before the names of its arrays
 ZOOM = 1.18  # of the picture that the network sees
-TRUST = np.float32(0.6)  # in the network, the rest in the trees
+TRUST = np.float32(0.7)  # in the network, the rest in the trees
 DOUBT = np.float32(1e-4)  # of any belief
 ALIKE = np.float32(0.1)  # what alike columns, and alike rows, count in a belief
 SMOOTH = 1 / 480  # of the working picture's rows
@@ -51,7 +51,7 @@ class Classifier:
     kind: `context` (features of the picture, then of the beliefs too) or `patch` (the paper's
     forest). height: rows of the working resolution. coarse: rows at which all stages but the last
     `fine` ones look at the picture. patch: side of the patches. about: free notes. network: what
-    is asked beside the stages of context; its belief counts a little more than theirs.
+    is asked beside the stages of context; its belief counts more than theirs.
     """
 
     kind: str

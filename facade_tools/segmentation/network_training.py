@@ -48,7 +48,7 @@ class NetworkOptions:
     multiples of 16; few, because each is compiled for itself.
     """
 
-    steps: int = 2500
+    steps: int = 4500
     widths: tuple[int, int, int, int] = (16, 40, 72, 104)
     rate: float = 3e-3
     decay: float = 1e-2

@@ -26,7 +26,7 @@ from facade_tools.exteriors.layout import building_layout
 from facade_tools.exteriors.learning import LearnOptions, learn_model
 from facade_tools.exteriors.network import infer
 from facade_tools.exteriors.prior import shipped_prior
-from facade_tools.exteriors.serialisation import network_of
+from facade_tools.exteriors.serialisation import groups_to_model, network_of
 from facade_tools.exteriors.transforms import TRANSFORMS, forward, inverse
 
 ALONE = """
@@ -168,6 +168,24 @@ def test_model_survives_its_file(model, houses):
     assert negative_log_density(again, houses) == pytest.approx(
         negative_log_density(model, houses), abs=1e-6
     )
+
+
+def test_rounding_of_another_processor_is_not_written(model):
+    network = network_of(model)
+    rng = np.random.default_rng(5)
+    first = network.families[0]
+    size = first.cov.shape[1]
+    root = rng.normal(0, 1, (len(first.cov), size, size)) * np.geomspace(0.05, 2, size)[:, None]
+    cov = root @ root.transpose(0, 2, 1)
+    cov[:, :2, 2:] = cov[:, 2:, :2] = 0
+    written = []
+    for noise in (0, 1e-17):
+        other = rng.normal(0, noise, cov.shape)
+        family = replace(first, cov=cov + other, coef=first.coef + rng.normal(0, noise))
+        families = (family, *network.families[1:])
+        group = groups_to_model(replace(network, families=families))[0]
+        written.append(canonical([group.coefficients, group.covariances]))
+    assert written[0] == written[1]
 
 
 def _broken(model, change):

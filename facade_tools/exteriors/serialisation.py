@@ -17,6 +17,7 @@ from .layout import Channel, GroupLayout, Layout
 from .network import Family, Network, topological
 
 TOLERANCE = 1e-6
+DIGITS = 12  # of a number against its scale; those after them differ between processors
 
 
 def _tuples(array: Floats) -> Any:
@@ -27,6 +28,21 @@ def _tuples(array: Floats) -> Any:
 
 def _frozen(value: Any) -> Any:
     return tuple(map(_frozen, value)) if isinstance(value, list) else value
+
+
+def _rounded(array: Floats, scale: Floats | float) -> Floats:
+    """Return numbers without what lies some `DIGITS` decimal places below their scale.
+
+    A covariance that is 0 but for rounding would else be another on each kind of processor.
+    """
+    quantum = 10.0 ** (np.rint(np.log10(scale)) - DIGITS)
+    rounded: Floats = np.rint(array / quantum) * quantum + 0.0
+    return rounded
+
+
+def _covariances(array: Floats) -> Any:
+    deviation = np.sqrt(np.diagonal(array, axis1=1, axis2=2))
+    return _tuples(_rounded(array, deviation[:, :, None] * deviation[:, None, :]))
 
 
 # --- arrays to artifact -------------------------------------------------------------------------
@@ -61,8 +77,8 @@ def _group_to_model(
         ),
         hidden=_tuples(family.hidden),
         inputs=tuple(layout.features[i] for i in family.inputs),
-        coefficients=_tuples(family.coef),
-        covariances=_tuples(family.cov),
+        coefficients=_tuples(_rounded(family.coef, 1.0)),
+        covariances=_covariances(family.cov),
         direct=family.direct,
     )
 

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from facade_tools.artifacts.parse import LABELS
 from facade_tools.errors import InvalidInput
 from facade_tools.grammar.library import builtin
 from facade_tools.segmentation import network_training
@@ -30,6 +31,7 @@ from facade_tools.segmentation.painting import render_facade
 from facade_tools.segmentation.views import _uneven, random_view
 
 WIDTHS = (4, 4, 8, 8)
+CLASSES = LABELS[1:]
 TINY = NetworkOptions(steps=500, widths=WIDTHS, rate=1e-2, memory=0.9, sizes=((96, 64),))
 
 
@@ -45,7 +47,7 @@ def pairs():
 
 @pytest.fixture(scope="module")
 def trained(pairs):
-    return train_network(pairs, 8, TINY, rng=np.random.default_rng(0))
+    return train_network(pairs, CLASSES, TINY, rng=np.random.default_rng(0))
 
 
 def random_weights(classes=3, seed=0):
@@ -151,14 +153,14 @@ def test_a_network_learns_rendered_facades(pairs, trained):
 
 
 def test_training_is_deterministic(pairs, trained):
-    again = train_network(pairs, 8, TINY, rng=np.random.default_rng(0))
+    again = train_network(pairs, CLASSES, TINY, rng=np.random.default_rng(0))
     for name, array in trained.weights.items():
         np.testing.assert_array_equal(array, again.weights[name])
 
 
 def test_training_goes_on_from_another_network(pairs, trained):
     few = replace(TINY, steps=10, rate=1e-4)  # from random weights these teach nothing
-    network = train_network(pairs, 8, few, rng=np.random.default_rng(1), start=trained)
+    network = train_network(pairs, CLASSES, few, rng=np.random.default_rng(1), start=trained)
     assert any((network.weights[name] != array).any() for name, array in trained.weights.items())
     found = [network.probabilities(picture).argmax(axis=0) + 1 for picture, _ in pairs]
     right = [(f == known)[known > 0].mean() for f, (_, known) in zip(found, pairs, strict=True)]

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..imaging.features import Picture
 from .autocontext import Labels
 from .network import Array, Convolve, Network, forward, inputs, pixels_of, shapes
+from .rebuilding import rebuilt
 from .views import Sizes, random_view
 
 State = tuple[dict[str, Array], ...]  # weights, both moments of their gradients, mean of weights
@@ -59,25 +60,25 @@ class NetworkOptions:
 
 def train_network(
     pairs: Sequence[tuple[Picture, Labels]],
-    classes: int,
+    classes: Sequence[str],
     options: NetworkOptions,
     *,
     rng: np.random.Generator,
     start: Network | None = None,
 ) -> Network:
-    """Return a network of `classes` classes; labels are 0 (ignored) or class + 1.
+    """Return a network of these classes; labels are 0 (ignored) or class + 1.
 
     start: a network of these classes and widths to go on from; None: from random weights.
     """
-    step = _compiled_step(classes, options)
+    step = _compiled_step(len(classes), options)
     if start is None:
-        weights = _start(shapes(options.widths, classes), rng)
+        weights = _start(shapes(options.widths, len(classes)), rng)
     else:
         weights = {name: array.copy() for name, array in start.weights.items()}
     nothing = {name: np.zeros_like(array) for name, array in weights.items()}
     state: State = (weights, nothing, dict(nothing), dict(weights))
     losses: list[Array] = []
-    for number, (picture, labels) in enumerate(_views(pairs, options, rng)):
+    for number, (picture, labels) in enumerate(_views(pairs, classes, options, rng)):
         state, loss = step(state, inputs(picture), labels.astype(np.int32), _pace(options, number))
         losses.append(loss)
         if (number + 1) % REPORT == 0:
@@ -85,18 +86,22 @@ def train_network(
             losses.clear()
     half = {name: np.asarray(array, np.float16) for name, array in state[3].items()}
     kept = {name: array.astype(np.float32) for name, array in half.items()}  # as the file keeps it
-    return Network(options.widths, classes, kept)
+    return Network(options.widths, len(classes), kept)
 
 
 def _views(
-    pairs: Sequence[tuple[Picture, Labels]], options: NetworkOptions, rng: np.random.Generator
+    pairs: Sequence[tuple[Picture, Labels]],
+    classes: Sequence[str],
+    options: NetworkOptions,
+    rng: np.random.Generator,
 ) -> Iterator[tuple[Picture, Labels]]:
-    """Yield views of the pictures in random order, each as often as the others."""
+    """Yield views of the pictures in random order, each as often as the others, some rebuilt."""
     order: list[int] = []
     for _ in range(options.steps):
         if not order:
             order = rng.permutation(len(pairs)).tolist()
-        yield random_view(*pairs[order.pop()], options.sizes, rng=rng)
+        whole = rebuilt(*pairs[order.pop()], classes, rng=rng)
+        yield random_view(*whole, options.sizes, rng=rng)
 
 
 def _start(

@@ -138,7 +138,7 @@ def _network(
     if known is not None and known.network is not None:
         start = scores_for(known.network, known.classes, classes)
         settings = replace(settings, widths=start.widths)
-    return train_network(views, len(classes), settings, rng=rng, start=start)
+    return train_network(views, classes, settings, rng=rng, start=start)
 
 
 def _working(pair: Pair, height: int) -> Pair:

@@ -187,9 +187,8 @@ def _glaze(
         donor.y1,
     )
     wide, high = place.width / donor.width, place.height / donor.height
-    onto = Box(
-        place.x0 - round(frame * wide), place.y0 - round(frame * high), place.x1, place.y1
-    )._replace(x1=place.x1 + round(frame * wide))
+    aside, above = round(frame * wide), round(frame * high)
+    onto = Box(place.x0 - aside, place.y0 - above, place.x1 + aside, place.y1)
     if onto.x0 < 0 or onto.y0 < 0 or onto.x1 > width or onto.y1 > height:
         return
     seen = framed.of(picture)

@@ -22,7 +22,7 @@ COLOURS = np.random.default_rng(5).integers(40, 200, (len(LABELS), 3)).astype(np
 NUMBERS = (WINDOW, WALL, SHOP)
 
 
-def facade(shop=(10, 110)):
+def facade():
     """Sky over a roof with two dormers, two storeys of three windows, a shop."""
     labels = np.full((160, 120), WALL, np.uint8)
     labels[:20] = SKY
@@ -32,7 +32,7 @@ def facade(shop=(10, 110)):
     for y in (52, 84):
         for x in (12, 50, 88):
             labels[y : y + 22, x : x + 18] = WINDOW
-    labels[118:, shop[0] : shop[1]] = SHOP
+    labels[118:, 10:110] = SHOP
     return COLOURS[labels], labels
 
 

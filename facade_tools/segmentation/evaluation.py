@@ -25,18 +25,22 @@ def confusion(truth: NDArray[np.uint8], found: NDArray[np.uint8]) -> NDArray[np.
     return np.bincount(pairs, minlength=len(LABELS) ** 2).reshape(len(LABELS), -1)
 
 
+def boxes_of_mask(mask: NDArray[np.bool_], least: int) -> Boxes:
+    """Return the bounding boxes of the connected parts of a mask of at least `least` pixels."""
+    _, _, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=4)
+    x, y, width, height, area = stats[1:].T
+    boxes = np.stack([x, y, x + width, y + height], axis=1).astype(np.float64)
+    kept: Boxes = boxes[area >= least]
+    return kept
+
+
 def boxes_of_labels(labels: NDArray[np.uint8]) -> Boxes:
     """Return the bounding boxes of the connected components of window pixels.
 
     Annotated rectangles that lie on each other leave lines one pixel high, some 25 pixels long,
     which are no windows.
     """
-    mask = (labels == WINDOW).astype(np.uint8)
-    _, _, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=4)
-    x, y, width, height, area = stats[1:].T
-    boxes = np.stack([x, y, x + width, y + height], axis=1).astype(np.float64)
-    kept: Boxes = boxes[area >= LEAST_AREA]
-    return kept
+    return boxes_of_mask(labels == WINDOW, LEAST_AREA)
 
 
 def boxes_of_regions(regions: Sequence[Region]) -> Boxes:

@@ -8,6 +8,7 @@ pictures show that what a thing looks like tells more than where it lies.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import cv2
@@ -16,10 +17,11 @@ from numpy.typing import NDArray
 
 from ..imaging.features import Picture
 from .autocontext import Labels
+from .evaluation import LEAST_AREA, boxes_of_mask
 
 GROUND, ATTIC = 0.35, 0.6  # shares of pictures whose ground floor, whose attic is rebuilt
 SHOPS = 0.5  # share of the shops of such a ground floor that become wall with windows
-LEAST, SHOP_LEAST = 30, 200  # pixels of a window, of a shop
+SHOP_LEAST = 200  # pixels of a shop
 ALIKE = (0.6, 2.0)  # areas of windows that are copied, median areas
 PURE = 0.97  # share of wall in a column of pixels of a sample of wall
 NARROW = 5  # pixels, the least width of such a sample
@@ -76,25 +78,23 @@ def with_ground_windows(
     numbers: of windows, walls and shops in the labels. What stays of a shop below is ignored (0).
     """
     glass, wall, shop = numbers
-    windows = _usual(_boxes(labels == glass, LEAST))
+    windows = _usual(_boxes(labels == glass, LEAST_AREA))
     shops = [box for box in _boxes(labels == shop, SHOP_LEAST) if rng.random() < SHOPS]
     if not windows or not shops:
         return picture, labels
-    picture, labels = picture.copy(), labels.copy()
+    site = _Site(picture.copy(), labels.copy(), glass, wall, shop)
     for box in shops:
-        sample = _wall_sample(labels == wall, windows, rng)
+        sample = _wall_sample(site.labels == wall, windows, rng)
         if sample is not None:
-            standing = _walled(picture, labels, box, sample, (wall, shop), rng)
+            standing = site.walled(box, sample, rng)
             for place in _row(standing, windows, rng):
-                _glaze(picture, labels, place, windows[int(rng.integers(len(windows)))], glass, rng)
-    return picture, labels
+                site.glaze(place, windows[int(rng.integers(len(windows)))], rng)
+    return site.picture, site.labels
 
 
 def _boxes(mask: NDArray[np.bool_], least: int) -> list[Box]:
     """Return the boxes of the connected parts of a mask of at least so many pixels."""
-    _, _, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=4)
-    kept = (row for row in stats[1:].tolist() if row[4] >= least)
-    return [Box(x, y, x + width, y + height) for x, y, width, height, _ in kept]
+    return [Box(*(int(side) for side in box)) for box in boxes_of_mask(mask, least)]
 
 
 def _usual(windows: Sequence[Box]) -> list[Box]:
@@ -124,31 +124,57 @@ def _first_false(row: NDArray[np.bool_]) -> int:
     return int(np.argmin(row)) if not row.all() else len(row)
 
 
-def _walled(
-    picture: Picture,
-    labels: Labels,
-    box: Box,
-    sample: Box,
-    numbers: tuple[int, int],
-    rng: np.random.Generator,
-) -> Box:
-    """Lay wall over a shop, but for its lowest part (cars, passers-by); return the wall's box."""
-    wall, shop = numbers
-    hidden = int(box.height * rng.uniform(0, 0.3)) if rng.random() < 0.7 else 0
-    over = box._replace(y1=box.y1 - hidden)
-    stones = sample.of(picture)
-    more = (max(over.height - sample.height, 0), max(over.width - sample.width, 0))
-    laid = np.pad(stones, ((0, more[0]), (0, more[1]), (0, 0)), mode="symmetric")
-    laid = laid[: over.height, : over.width]
-    if rng.random() < 0.6:
-        paint = rng.uniform(0.75, 1.3) + rng.uniform(-0.05, 0.05, 3)
-        laid = np.clip(laid * paint, 0, 255).astype(np.uint8)
-    inside = over.of(labels) == shop
-    over.of(picture)[inside] = laid[inside]
-    over.of(labels)[inside] = wall
-    rest = box._replace(y0=over.y1).of(labels)
-    rest[rest == shop] = 0
-    return over
+@dataclass(frozen=True, slots=True)
+class _Site:
+    """A picture and its labels, which change in place. glass, wall, shop: numbers in the labels."""
+
+    picture: Picture
+    labels: Labels
+    glass: int
+    wall: int
+    shop: int
+
+    def walled(self, box: Box, sample: Box, rng: np.random.Generator) -> Box:
+        """Lay wall over a shop but for its foot (cars, passers-by); return the wall's box."""
+        hidden = int(box.height * rng.uniform(0, 0.3)) if rng.random() < 0.7 else 0
+        over = box._replace(y1=box.y1 - hidden)
+        stones = sample.of(self.picture)
+        more = (max(over.height - sample.height, 0), max(over.width - sample.width, 0))
+        laid = np.pad(stones, ((0, more[0]), (0, more[1]), (0, 0)), mode="symmetric")
+        laid = laid[: over.height, : over.width]
+        if rng.random() < 0.6:
+            paint = rng.uniform(0.75, 1.3) + rng.uniform(-0.05, 0.05, 3)
+            laid = np.clip(laid * paint, 0, 255).astype(np.uint8)
+        inside = over.of(self.labels) == self.shop
+        over.of(self.picture)[inside] = laid[inside]
+        over.of(self.labels)[inside] = self.wall
+        rest = box._replace(y0=over.y1).of(self.labels)
+        rest[rest == self.shop] = 0
+        return over
+
+    def glaze(self, place: Box, donor: Box, rng: np.random.Generator) -> None:
+        """Copy a window with its frame to a place, and lay a sill below."""
+        frame, sill = int(rng.integers(1, 4)), int(rng.integers(1, 4))
+        height, width = self.labels.shape
+        framed = Box(
+            max(donor.x0 - frame, 0),
+            max(donor.y0 - frame, 0),
+            min(donor.x1 + frame, width),
+            donor.y1,
+        )
+        wide, high = place.width / donor.width, place.height / donor.height
+        aside, above = round(frame * wide), round(frame * high)
+        onto = Box(place.x0 - aside, place.y0 - above, place.x1 + aside, place.y1)
+        if onto.x0 < 0 or onto.y0 < 0 or onto.x1 > width or onto.y1 > height:
+            return
+        seen = framed.of(self.picture)
+        if rng.random() < 0.5:
+            seen = seen[:, ::-1]
+        size = (onto.width, onto.height)
+        onto.of(self.picture)[:] = cv2.resize(seen, size, interpolation=cv2.INTER_AREA)
+        place.of(self.labels)[:] = self.glass
+        ledge = onto._replace(y0=place.y1, y1=min(place.y1 + sill, height)).of(self.picture)
+        ledge[:] = np.clip(ledge.astype(np.int64) + rng.integers(-30, 60), 0, 255)
 
 
 def _row(wall: Box, windows: Sequence[Box], rng: np.random.Generator) -> Iterator[Box]:
@@ -167,38 +193,6 @@ def _row(wall: Box, windows: Sequence[Box], rng: np.random.Generator) -> Iterato
         window = Box(x, top, x + width, min(top + height, wall.y1))
         if rng.random() > 0.1 and window.width > 1 and window.height > 1:
             yield window
-
-
-def _glaze(
-    picture: Picture,
-    labels: Labels,
-    place: Box,
-    donor: Box,
-    glass: int,
-    rng: np.random.Generator,
-) -> None:
-    """Copy a window with its frame to a place, and lay a sill below."""
-    frame, sill = int(rng.integers(1, 4)), int(rng.integers(1, 4))
-    height, width = labels.shape
-    framed = Box(
-        max(donor.x0 - frame, 0),
-        max(donor.y0 - frame, 0),
-        min(donor.x1 + frame, width),
-        donor.y1,
-    )
-    wide, high = place.width / donor.width, place.height / donor.height
-    aside, above = round(frame * wide), round(frame * high)
-    onto = Box(place.x0 - aside, place.y0 - above, place.x1 + aside, place.y1)
-    if onto.x0 < 0 or onto.y0 < 0 or onto.x1 > width or onto.y1 > height:
-        return
-    seen = framed.of(picture)
-    if rng.random() < 0.5:
-        seen = seen[:, ::-1]
-    size = (onto.width, onto.height)
-    onto.of(picture)[:] = cv2.resize(seen, size, interpolation=cv2.INTER_AREA)
-    place.of(labels)[:] = glass
-    ledge = onto._replace(y0=place.y1, y1=min(place.y1 + sill, height)).of(picture)
-    ledge[:] = np.clip(ledge.astype(np.int64) + rng.integers(-30, 60), 0, 255)
 
 
 def with_attic_moved(

@@ -87,6 +87,7 @@ def main():
     parser.add_argument("--features", default="context")
     parser.add_argument("--classifier", help="test this one on everything instead of training")
     parser.add_argument("--start", help="classifier of other pictures whose networks go on")
+    parser.add_argument("--steps", type=int, help="views of the network, else as by default")
     parser.add_argument("--work", type=Path, default=Path("build/facade_parsing"))
     parser.add_argument("--no-walk", action="store_true")
     parser.add_argument("--grammars", nargs="*", default=GRAMMARS, help="none: pixels alone")
@@ -100,6 +101,8 @@ def main():
     folds = folds_of(pairs, args.folds)
     start = load_start(args.start) if args.start else None
     options = replace(TrainOptions(), features=args.features, start=start)
+    if args.steps is not None:
+        options = replace(options, network=replace(options.network, steps=args.steps))
     plans = {name: plan(builtin(name)) for name in args.grammars}
     solvers = ("dp",) if args.no_walk else ("dp", "walk")
     keys = ["raw", *(f"{s} {g}" for s in solvers for g in args.grammars)]

@@ -34,7 +34,7 @@ from . import _options
               help="Varied copies a picture: mirror, light, blur, perspective.")  # fmt: skip
 @click.option("--balance", type=click.FloatRange(0, 1), default=0.0, show_default=True,
               help="0 weighs pixels equally, 1 classes.")  # fmt: skip
-@click.option("--steps", type=click.IntRange(0, 10**6), default=4500, show_default=True,
+@click.option("--steps", type=click.IntRange(0, 10**6), default=7000, show_default=True,
               help="Views that train the network beside the trees; 0: trees alone.")  # fmt: skip
 @click.option("--start", metavar="NPZ",
               help="Classifier of other pictures whose network goes on here.")  # fmt: skip

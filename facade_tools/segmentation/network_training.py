@@ -49,7 +49,7 @@ class NetworkOptions:
     multiples of 16; few, because each is compiled for itself.
     """
 
-    steps: int = 4500
+    steps: int = 7000
     widths: tuple[int, int, int, int] = (16, 40, 72, 104)
     rate: float = 3e-3
     decay: float = 1e-2

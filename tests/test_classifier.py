@@ -13,6 +13,7 @@ from facade_tools.grammar.library import builtin
 from facade_tools.imaging.features import pixel_features, shifted
 from facade_tools.imaging.features_context import context_features
 from facade_tools.segmentation.augmentation import varied
+from facade_tools.segmentation.autocontext import run_stages
 from facade_tools.segmentation.boosting import BoostOptions, train_boosted
 from facade_tools.segmentation.classifier import Classifier, decoded, default, save
 from facade_tools.segmentation.conventions import CONVENTIONS, convention
@@ -227,6 +228,20 @@ def test_a_classifier_of_other_features_is_refused(trained):
     data = tampered(trained, feature0=wide)
     with pytest.raises(InvalidInput, match="other features"):
         decoded(data).probabilities(np.zeros((20, 20, 3), np.uint8))
+
+
+def test_the_last_stage_is_not_asked_about_what_is_told():
+    shipped = default()
+    picture = shipped.working(rendered(3).picture)
+    told = np.zeros(picture.shape[:2], bool)
+    told[:, : told.shape[1] // 2] = True
+
+    def belief(told):
+        return run_stages(shipped.stages, picture, shipped.coarse, shipped.fine, told)
+
+    asked, taken = belief(None), belief(np.ones_like(told))
+    assert np.abs(asked - taken)[:, told].max() > 0.1
+    assert np.array_equal(belief(told), np.where(told, taken, asked))
 
 
 def test_the_shipped_classifier_reads_rendered_facades():

@@ -85,20 +85,27 @@ def _between(coarse: Probabilities, stride: int, shape: tuple[int, int]) -> Prob
     return np.stack(planes)
 
 
-def run_stages(stages: Sequence[Trees], picture: Picture, height: int, fine: int) -> Probabilities:
+def run_stages(
+    stages: Sequence[Trees],
+    picture: Picture,
+    height: int,
+    fine: int,
+    told: NDArray[np.bool_] | None = None,
+) -> Probabilities:
     """Return the belief of the last stages about a picture.
 
     fine: how many of the stages see the picture itself, 1 or 2; the others see `height` rows.
+    told: pixels that the last stages need not be asked about.
     """
     coarse = fitted(picture, height, COARSE_PIXELS)
     before: Probabilities | None = None
     for trees in stages[:-fine]:
         before = predict(trees, features_of(coarse, before), EARLY_STRIDE)
     edges = fine_features(picture)
-    first = finished(stages[-fine], planes_of(edges, coarse, before))
+    first = finished(stages[-fine], planes_of(edges, coarse, before), told)
     if fine == 1:
         return first
-    second = finished(stages[-1], planes_again(edges, first))
+    second = finished(stages[-1], planes_again(edges, first), told)
     mean: Probabilities = (first + second) / np.float32(2)
     return mean
 

@@ -33,6 +33,7 @@ MAX_PIXELS = 400_000  # at working resolution
 KINDS = ("context", "patch")
 NETWORK = "network."  # before the names of its arrays
 ZOOM = 1.18  # of the picture that the network sees
+SURE = np.float32(0.95)  # where the network believes this, the last stages are not asked
 TRUST = np.float32(0.7)  # in the network, the rest in the trees
 DOUBT = np.float32(1e-4)  # of any belief
 ALIKE = np.float32(0.1)  # what alike columns, and alike rows, count in a belief
@@ -91,10 +92,11 @@ class Classifier:
 
     def _asked(self, picture: Picture) -> list[Probabilities]:
         """Return the belief of the stages, and that of the network if there is one."""
-        beliefs = [run_stages(self.stages, picture, self.coarse, self.fine)]
-        if self.network is not None:
-            beliefs.append(_zoomed(self.network, picture))
-        return beliefs
+        if self.network is None:
+            return [run_stages(self.stages, picture, self.coarse, self.fine)]
+        seen = _zoomed(self.network, picture)
+        told = seen.max(axis=0) >= SURE
+        return [run_stages(self.stages, picture, self.coarse, self.fine, told), seen]
 
 
 def _zoomed(network: Network, picture: Picture) -> Probabilities:

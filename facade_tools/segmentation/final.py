@@ -83,9 +83,15 @@ def planes_again(edges: Features, belief: Probabilities) -> Planes:
     return Planes(None, (edges, context_features(belief), *means), belief)
 
 
-def finished(trees: Trees, planes: Planes) -> Probabilities:
-    """Return class probabilities of every pixel, (classes, height, width)."""
-    where = np.flatnonzero(planes.doubtful())
+def finished(trees: Trees, planes: Planes, told: NDArray[np.bool_] | None = None) -> Probabilities:
+    """Return class probabilities of every pixel, (classes, height, width).
+
+    told: where the belief of the stages before is enough, because something else is certain.
+    """
+    doubt = planes.doubtful()
+    if told is not None and planes.belief is not None:
+        doubt &= ~told
+    where = np.flatnonzero(doubt)
     height, width = planes.shape
     out = np.zeros((trees.classes, height * width), np.float32)
     if planes.belief is not None:

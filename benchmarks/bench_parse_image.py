@@ -9,6 +9,7 @@ import sys
 import time
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from facade_tools.grammar.library import builtin
 from facade_tools.grammar.plan import plan
@@ -27,6 +28,7 @@ def timed(function):
 
 def main():
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 6
+    threadpool_limits(1)  # as the command line does
     classifier = default()
     plans = {name: plan(builtin(name)) for name in ("haussmann", "haussmann-floors")}
     rows = []

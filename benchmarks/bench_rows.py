@@ -17,6 +17,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 from facade_parsing import FOLDS, folds_of
+from threadpoolctl import threadpool_limits
 
 from facade_tools.grammar.library import builtin
 from facade_tools.grammar.plan import plan
@@ -95,6 +96,7 @@ def main():
     parser.add_argument("--copies", type=int, default=0, help="disturbed copies a picture")
     args = parser.parse_args()
     cv2.setNumThreads(1)
+    threadpool_limits(1)  # as the command line does
     made = plan(builtin(args.grammar))
     names = convention(args.convention)
     pairs = list(read_pairs(str(args.data / "images"), str(args.data / "labels"), names))

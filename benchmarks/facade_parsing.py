@@ -15,6 +15,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from facade_tools.artifacts.parse import LABELS
 from facade_tools.grammar.derivation import painted
@@ -102,6 +103,7 @@ def main():
     parser.add_argument("--limit", type=int, default=10**6, help="pictures, spread over the set")
     args = parser.parse_args()
     cv2.setNumThreads(1)
+    threadpool_limits(1)  # as the command line does
     args.work.mkdir(parents=True, exist_ok=True)
     images, labels = str(args.data / "images"), str(args.data / "labels")
     pairs = list(read_pairs(images, labels, convention(args.convention)))

@@ -62,13 +62,14 @@ def test_shapes_of_expressions_forget_names_only():
     assert shape(parse("Wa (TL Wa)*")) != shape(parse("Wa (TL Wa)+"))
 
 
-def random_problem(seed, states=3, length=7):
+def random_problem(seed, states=3, length=7, widest=5):
     rng = np.random.default_rng(seed)
     allowed = rng.random((states, states)) < 0.7
     machine = Moves(allowed, rng.random(states) < 0.8, rng.random(states) < 0.8)
     least = rng.integers(1, 3, states)
-    most = least + rng.integers(0, 5, states)
-    prior = np.column_stack([rng.uniform(1, 4, states), rng.uniform(0, 1, states), np.ones(states)])
+    most = least + rng.integers(0, widest, states)
+    weight = rng.random(states) < rng.choice([0.0, 0.5, 1.0])
+    prior = np.column_stack([rng.uniform(1, 4, states), rng.uniform(0, 1, states), weight])
     return rng.random((states, length)), machine, Bounds(least, most, prior)
 
 
@@ -93,7 +94,7 @@ def brute_force(costs, machine, limits):
     return best
 
 
-@pytest.mark.parametrize("seed", range(25))
+@pytest.mark.parametrize("seed", range(60))
 def test_the_programme_of_one_axis_equals_brute_force(seed):
     problem = random_problem(seed)
     cut = best_cut(*problem)
@@ -104,6 +105,31 @@ def test_the_programme_of_one_axis_equals_brute_force(seed):
         assert cut.cost == pytest.approx(expected, abs=1e-6)
         assert cut.bounds[0] == 0
         assert cut.bounds[-1] == problem[0].shape[1]
+
+
+def plain_programme(costs, machine, limits):
+    """Return the cheapest cost of the whole line: every end, state, size and word before tried."""
+    states, length = costs.shape
+    end = np.full((states, length + 1), np.inf)
+    for at in range(1, length + 1):
+        for state in range(states):
+            for size in range(limits.least[state], min(at, limits.most[state]) + 1):
+                befores = end[machine.allowed[:, state], at - size]
+                entered = befores.min(initial=np.inf)
+                if size == at and machine.first[state]:
+                    entered = 0.0
+                cost = costs[state, at - size : at].sum() + size_cost(limits, state, size)
+                end[state, at] = min(end[state, at], entered + cost)
+    return end[machine.last, length].min(initial=np.inf)
+
+
+@given(st.integers(0, 10**6), st.integers(1, 70), st.integers(1, 90))
+@settings(max_examples=60, deadline=None)
+def test_long_lines_cost_what_the_plain_programme_says(seed, length, widest):
+    problem = random_problem(seed, states=4, length=length, widest=widest)
+    cut = best_cut(*problem)
+    expected = plain_programme(*problem)
+    assert (np.inf if cut is None else cut.cost) == pytest.approx(expected, abs=1e-6)
 
 
 @pytest.mark.parametrize("name", BUILTIN)

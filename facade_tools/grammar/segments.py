@@ -90,11 +90,17 @@ def size_cost(limits: Bounds, state: int, length: int) -> float:
     return float(weight * ((length - typical) * steep) ** 2 / 2)
 
 
+def prior_cost(limits: Bounds, cut: Cut) -> float:
+    """Return the prior energy of all lengths of a cutting."""
+    typical, steep, weight = limits.prior[list(cut.states)].T
+    return float(np.sum(weight * ((np.diff(cut.bounds) - typical) * steep) ** 2 / 2))
+
+
 def best_cut(costs: Costs, machine: Moves, limits: Bounds) -> Cut | None:
     """Return the cheapest cutting of the line that the automaton and the bounds allow.
 
-    Exact: a dynamic programme over (end, state), O(length · states · largest bounded size). None
-    where no word fits.
+    Exact: a dynamic programme over (end, state), O(length · states²), and O(length · largest size)
+    more for each state with a prior. None where no word fits.
     Of cuttings that cost the same (within 1e-9) the one with longer last parts wins.
     """
     prefix = np.zeros((costs.shape[0], costs.shape[1] + 1))
@@ -126,7 +132,7 @@ def _window(
     end: NDArray[np.float64],
     begin: NDArray[np.int64],
 ) -> None:
-    """Find the best origin of a state with bounds or a prior that ends at `at`."""
+    """Find the best origin of a state with a prior that ends at `at`."""
     for origin in range(max(0, at - most[state]), at - least[state] + 1):
         if start[state, origin] == np.inf:
             continue
@@ -154,26 +160,31 @@ def solve(
     begin = np.zeros((states, size), np.int64)
     start = np.full((states, size), np.inf)
     before = np.full((states, size), -1, np.int64)
-    for state in range(states):
-        if first[state]:
-            start[state, 0] = 0.0
-    least_cost = np.full(states, np.inf)
-    least_origin = np.zeros(states, np.int64)
+    start[:, 0] = np.where(first, 0.0, np.inf)
+    # a queue for each state without a prior: origins whose cost may still become the least, each
+    # later and dearer than the one before. Calls here would take longer than what they do
+    origins = np.empty((states, size), np.int64)
+    costs = np.empty((states, size))
+    head, tail = np.zeros((2, states), np.int64)
     for at in range(1, size):
         for state in range(states):
-            if prior[state, 2] == 0.0 and most[state] >= size - 1:
-                # no bound and no prior: the best origin so far stays the best
-                origin = at - least[state]
-                if origin >= 0 and start[state, origin] < np.inf:
-                    cost = start[state, origin] - prefix[state, origin]
-                    if cost < least_cost[state] - TIE:
-                        least_cost[state] = cost
-                        least_origin[state] = origin
-                end[state, at] = least_cost[state]
-                begin[state, at] = least_origin[state]
-            else:
+            if prior[state, 2] > 0.0:
                 _window(state, at, start, prefix, least, most, prior, end, begin)
-            end[state, at] += prefix[state, at]
+                end[state, at] += prefix[state, at]
+                continue
+            origin = at - least[state]
+            if origin >= 0 and start[state, origin] < np.inf:
+                cost = start[state, origin] - prefix[state, origin]
+                while tail[state] > head[state] and costs[state, tail[state] - 1] > cost + TIE:
+                    tail[state] -= 1
+                origins[state, tail[state]] = origin
+                costs[state, tail[state]] = cost
+                tail[state] += 1
+            while head[state] < tail[state] and origins[state, head[state]] < at - most[state]:
+                head[state] += 1
+            if head[state] < tail[state]:
+                begin[state, at] = origins[state, head[state]]
+                end[state, at] = costs[state, head[state]] + prefix[state, at]
         for state in range(states):
             for other in range(states):
                 if allowed[other, state] and end[other, at] < start[state, at] - TIE:

@@ -13,14 +13,13 @@ from numpy.typing import NDArray
 
 from ..errors import Infeasible
 from ..grammar.plan import Plan
-from ..grammar.segments import Cut, best_cut, chain, moves
+from ..grammar.segments import Bounds, Cut, Moves, best_cut, chain, moves, prior_cost
 from .energy import (
     Field,
     Layout,
     coarsened,
     column_costs,
     column_limits,
-    column_prior,
     energy,
     row_limits,
     state_costs,
@@ -56,49 +55,70 @@ def solve(field: Field, plan: Plan) -> Solution:
     """
     factor = max(-(-side // most) for side, most in zip(field.shape, COARSE, strict=True))
     if factor == 1:
-        return _solve(field, plan)
-    coarse = _solve(coarsened(field, factor), plan)
+        return _solve(_task(field, plan))
+    coarse = _solve(_task(coarsened(field, factor), plan))
     layout = enlarged(coarse.layout, factor, field.shape)
     layout = refined(field, plan, layout, REACH * factor)
     reached = energy(field, plan, layout)
     return Solution(layout, reached, (*coarse.trace, reached), relaxed_bound(field, plan))
 
 
-def _solve(field: Field, plan: Plan) -> Solution:
+@dataclass(frozen=True, slots=True)
+class _Task:
+    """A field under a plan, with what all half-steps ask for.
+
+    rows, columns: what may follow what, and sizes in pixels; of rows, of each group's columns.
+    """
+
+    field: Field
+    plan: Plan
+    rows: tuple[Moves, Bounds]
+    columns: tuple[tuple[Moves, Bounds], ...]
+
+
+def _task(field: Field, plan: Plan) -> _Task:
+    rows = moves(plan.rows), row_limits(plan, field, range(len(plan.states)))
+    columns = [
+        (moves(group.automaton), column_limits(plan, field, number))
+        for number, group in enumerate(plan.groups)
+    ]
+    return _Task(field, plan, rows, tuple(columns))
+
+
+def _solve(task: _Task) -> Solution:
     """Alternate from several starts on the field as it is.
 
     A grammar whose floors derive each for itself goes on from every start and from its best
     common columns.
     """
-    relaxed = _relaxed(field, plan)
-    bound = _solve_rows(field, plan, relaxed[0]).cost
+    free = _free_rows(task.field, task.plan)
+    bound = _solve_rows(task, free).cost
     best: Layout | None = None
     reached = np.inf
     trace: list[float] = []
     seen: set[tuple[int, ...]] = set()
-    for rows in _starts(field, plan, relaxed):
-        layout, path = _alternate(field, plan, rows)
+    for rows in _starts(task, free):
+        layout, path = _alternate(task, rows)
         found = [(layout, path[-1])]
-        if plan.per_floor:
+        if task.plan.per_floor:
             # the best common columns may hide floors that the picture shows
             fresh = [cut for cut in (rows, layout.rows) if _key(cut) not in seen]
             seen.update(_key(cut) for cut in fresh)
-            found = [_unfactored(field, plan, cut) for cut in fresh]
+            found = [_unfactored(task, cut) for cut in fresh]
         for layout, cost in found:
             trace.append(cost)
             if cost < reached - GAIN:
                 best, reached = layout, cost
     assert best is not None
-    return Solution(best, energy(field, plan, best), tuple(trace), bound)
+    return Solution(best, energy(task.field, task.plan, best), tuple(trace), bound)
 
 
-def _starts(
-    field: Field, plan: Plan, relaxed: tuple[NDArray[np.float64], NDArray[np.float64]]
-) -> list[Cut]:
+def _starts(task: _Task, free: NDArray[np.float64]) -> list[Cut]:
     """Return different rows to start from: columns forgotten, more and less freely."""
     cuts: dict[tuple[int, ...], Cut] = {}
+    mean = _mean_rows(task.field, task.plan)
     for mix in STARTS:
-        rows = _solve_rows(field, plan, (1 - mix) * relaxed[0] + mix * relaxed[1])
+        rows = _solve_rows(task, (1 - mix) * free + mix * mean)
         cuts.setdefault(_key(rows), rows)
     return list(cuts.values())
 
@@ -109,38 +129,48 @@ def _key(cut: Cut) -> tuple[int, ...]:
 
 def relaxed_bound(field: Field, plan: Plan) -> float:
     """Return what no layout of the grammar can cost less than, common columns or not."""
-    return _solve_rows(field, plan, _relaxed(field, plan)[0]).cost
+    return _solve_rows(_task(field, plan), _free_rows(field, plan)).cost
 
 
-def _relaxed(field: Field, plan: Plan) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return (states, height) costs of rows whose pixels choose their kind freely, and of the mean.
+def _free_rows(field: Field, plan: Plan) -> NDArray[np.float64]:
+    """Return (states, height): cost of rows whose pixels choose their kind freely.
 
-    The first bounds every layout from below: the columns are forgotten.
+    It bounds every layout from below: the columns are forgotten.
     """
-    known: dict[tuple[int, ...], tuple[NDArray[np.float64], NDArray[np.float64]]] = {}
-    pairs = []
-    for state in plan.states:
-        planes = tuple(sorted({field.label[label] for label in state.labels}))
-        if planes not in known:
-            table = field.cost[list(planes)]
-            known[planes] = (table.min(axis=0).sum(axis=1), table.mean(axis=0).sum(axis=1))
-        pairs.append(known[planes])
-    return np.array([pair[0] for pair in pairs]), np.array([pair[1] for pair in pairs])
+    known = {planes: _cheapest(field, planes) for planes in dict.fromkeys(_planes(field, plan))}
+    return np.array([known[planes] for planes in _planes(field, plan)])
 
 
-def _solve_rows(field: Field, plan: Plan, costs: NDArray[np.float64]) -> Cut:
-    every = range(len(plan.states))
-    cut = best_cut(costs, moves(plan.rows), row_limits(plan, field, every))
+def _cheapest(field: Field, planes: tuple[int, ...]) -> NDArray[np.float64]:
+    least = field.cost[planes[0]].copy()
+    for plane in planes[1:]:
+        np.minimum(least, field.cost[plane], out=least)
+    total: NDArray[np.float64] = least.sum(axis=1)
+    return total
+
+
+def _mean_rows(field: Field, plan: Plan) -> NDArray[np.float64]:
+    """Return (states, height): mean cost of rows over the kinds of their columns."""
+    whole = field.across[:, :, -1]
+    return np.array([whole[list(planes)].mean(axis=0) for planes in _planes(field, plan)])
+
+
+def _planes(field: Field, plan: Plan) -> list[tuple[int, ...]]:
+    """Return the planes that each state of a row may show."""
+    return [tuple(sorted({field.label[label] for label in s.labels})) for s in plan.states]
+
+
+def _solve_rows(task: _Task, costs: NDArray[np.float64]) -> Cut:
+    cut = best_cut(costs, *task.rows)
     if cut is None:
         raise Infeasible("no facade of the grammar is as small as the picture")
     return cut
 
 
-def _solve_columns(field: Field, plan: Plan, rows: list[tuple[int, int, int]]) -> Cut:
-    group = plan.states[rows[0][0]].group
+def _solve_columns(task: _Task, rows: list[tuple[int, int, int]]) -> Cut:
+    group = task.plan.states[rows[0][0]].group
     assert group is not None
-    machine = moves(plan.groups[group].automaton)
-    cut = best_cut(column_costs(field, plan, rows), machine, column_limits(plan, field, group))
+    cut = best_cut(column_costs(task.field, task.plan, rows), *task.columns[group])
     if cut is None:
         raise Infeasible("no row of the grammar is as narrow as the picture")
     return cut
@@ -150,8 +180,9 @@ def _segments(rows: Cut) -> list[tuple[int, int, int]]:
     return list(zip(rows.states, rows.bounds, rows.bounds[1:], strict=False))
 
 
-def _alternate(field: Field, plan: Plan, rows: Cut) -> tuple[Layout, list[float]]:
+def _alternate(task: _Task, rows: Cut) -> tuple[Layout, list[float]]:
     """Improve rows and common columns in turn."""
+    field, plan = task.field, task.plan
     columns: dict[int, Cut] = {}
     path: list[float] = []
     for _ in range(MAX_ROUNDS):
@@ -163,25 +194,26 @@ def _alternate(field: Field, plan: Plan, rows: Cut) -> tuple[Layout, list[float]
                 if state.group == number
             ]
             if own or number not in columns:
-                columns[number] = _solve_columns(field, plan, own or every)
+                columns[number] = _solve_columns(task, own or every)
         groups = [state.group for state in plan.states]
         sets = [None if group is None else columns[group] for group in groups]
-        rows = _solve_rows(field, plan, state_costs(field, plan, range(len(groups)), sets))
+        rows = _solve_rows(task, state_costs(field, plan, range(len(groups)), sets))
         owner = tuple(-1 if (group := groups[s]) is None else group for s in rows.states)
         layout = Layout(rows, tuple(columns[g] for g in range(len(plan.groups))), owner)
-        path.append(rows.cost + _priors(field, plan, layout))
+        path.append(rows.cost + _priors(task, layout))
         if len(path) > 1 and path[-1] > path[-2] - GAIN:
             break
     return layout, path
 
 
-def _priors(field: Field, plan: Plan, layout: Layout) -> float:
+def _priors(task: _Task, layout: Layout) -> float:
     """Return the priors of the columns that rows use."""
     groups = {
-        o: plan.states[s].group for s, o in zip(layout.rows.states, layout.owner, strict=True)
+        own: group
+        for number, own in zip(layout.rows.states, layout.owner, strict=True)
+        if (group := task.plan.states[number].group) is not None
     }
-    used = [o for o in groups if o >= 0]
-    return sum(column_prior(plan, field, groups[o], layout.columns[o]) for o in used)
+    return sum(prior_cost(task.columns[groups[own]][1], layout.columns[own]) for own in groups)
 
 
 def owners(plan: Plan, rows: Cut) -> tuple[int, ...]:
@@ -213,17 +245,16 @@ def _same_instance(plan: Plan, before: int, after: int) -> bool:
     return plan.states[before].path == own and shared == len(own)
 
 
-def _unfactored(field: Field, plan: Plan, rows: Cut) -> tuple[Layout, float]:
+def _unfactored(task: _Task, rows: Cut) -> tuple[Layout, float]:
     """Give floors their own columns and alternate with the sequence of rows kept."""
+    field, plan = task.field, task.plan
     owner = owners(plan, rows)
     path: list[float] = []
     limits = row_limits(plan, field, rows.states)
     for _ in range(MAX_ROUNDS):
         segments = _segments(rows)
         columns = tuple(
-            _solve_columns(
-                field, plan, [s for s, o in zip(segments, owner, strict=True) if o == own]
-            )
+            _solve_columns(task, [s for s, o in zip(segments, owner, strict=True) if o == own])
             for own in range(max(owner) + 1)
         )
         sets = [None if own < 0 else columns[own] for own in owner]
@@ -232,7 +263,7 @@ def _unfactored(field: Field, plan: Plan, rows: Cut) -> tuple[Layout, float]:
         assert cut is not None  # the old bounds are a solution
         rows = Cut(rows.states, cut.bounds, cut.cost)
         layout = Layout(rows, columns, owner)
-        path.append(cut.cost + _priors(field, plan, layout))
+        path.append(cut.cost + _priors(task, layout))
         if len(path) > 1 and path[-1] > path[-2] - GAIN:
             break
     return layout, path[-1]

@@ -42,11 +42,13 @@ class Columns:
 
 
 def no_second_floor(values: tuple[Floats, ...], layout: Layout) -> None:
-    """Mark r2 as absent where r1 is 0."""
+    """Mark r2 as absent where r1 is 0; what is that near to 0 is 0."""
     floors = Columns(values, layout).get("r1", "r2")
     if floors:
         r1, r2 = floors
-        r2[np.abs(r1) <= ATOM_TOLERANCE] = ABSENT
+        for share in floors:
+            share[np.abs(share) <= ATOM_TOLERANCE] = 0.0
+        r2[r1 == 0] = ABSENT
 
 
 def storey_heights(values: tuple[Floats, ...], layout: Layout, typical: float) -> Floats:

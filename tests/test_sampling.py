@@ -70,6 +70,7 @@ def assert_possible(a: Attributes) -> None:
         assert 0 <= exposure <= 1
     for porch, back in zip(m.porch, (False, True), strict=True):
         assert not any(porch) or (porch[1] >= 0.5) == back
+        assert not any(porch) or porch[5] >= min(porch[2:4]) / (2 * sum(porch[2:4])) - 1e-9
         if gw and porch[2]:
             gaps = [
                 abs(m.garage[i] - porch[i]) * size - (m.garage[2 + i] + porch[2 + i]) / 2

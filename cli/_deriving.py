@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from math import isfinite, nan
 from pathlib import Path
 from typing import Any
 
@@ -49,9 +50,12 @@ def run_derive(grammar: str, stream: StreamOptions, values: Mapping[str, Any]) -
 def _value(text: str) -> tuple[str, float]:
     name, _, value = text.partition("=")
     try:
-        return name.strip(), float(value)
+        found = float(value)
     except ValueError:
-        raise click.UsageError(f"--set {text!r}: expected NAME=NUMBER") from None
+        found = nan
+    if not isfinite(found):
+        raise click.UsageError(f"--set {text!r}: expected NAME=NUMBER")
+    return name.strip(), found
 
 
 @dataclass(frozen=True)

@@ -80,6 +80,7 @@ def _reported(photo: Photo, path: str) -> Rectification:
 
 def _corners(text: str) -> Points:
     pairs = re.findall(r"(-?\d+(?:\.\d+)?)\s*,\s*(-?\d+(?:\.\d+)?)", text)
-    if len(pairs) != 4 or re.sub(r"[-\d.,\s]", "", text):
+    corners = np.array(pairs, np.float64)
+    if len(pairs) != 4 or re.sub(r"[-\d.,\s]", "", text) or not np.isfinite(corners).all():
         raise click.BadParameter(f"{text!r} is not four pairs X,Y in pixels, or auto")
-    return np.array(pairs, np.float64)
+    return corners

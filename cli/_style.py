@@ -6,6 +6,7 @@ import logging
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from math import inf
 from pathlib import Path
 
 import click
@@ -110,7 +111,7 @@ def _size(text: str) -> tuple[str, tuple[float, float, float]]:
         numbers = [float(part) for part in match.groups()[1:]] if match else []
     except ValueError:
         numbers = []
-    if match is None or not numbers or min(numbers) <= 0:
+    if match is None or not numbers or not all(0 < n < inf for n in numbers):
         raise click.UsageError(f"--resize {text!r}: expected BLOCK=WIDTHxDEPTHxHEIGHT in metres")
     return match.group(1), (numbers[0], numbers[1], numbers[2])
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from ._options import StreamOptions, stream_options
+from ._options import FiniteRange, StreamOptions, stream_options
 from ._stream import ItemStage, run_stream, side_input
 
 
@@ -26,7 +26,7 @@ from ._stream import ItemStage, run_stream, side_input
 )
 @click.option(
     "--require",
-    type=click.FloatRange(0),
+    type=FiniteRange(0),
     metavar="E",
     help="Exit 4 where the mass energy stays above E; default: only report it.",
 )

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from ._options import StreamOptions, stream_options
+from ._options import FiniteRange, StreamOptions, stream_options
 
 # Method -> function(ReadOptions) that returns a Method (facade_tools.grammar.reading); it loads
 # when it is called for.
@@ -34,11 +34,11 @@ METHODS = {
     help="dp: exact in turn over rows and columns; walk: the paper's random walk.",
 )  # fmt: skip
 @click.option(
-    "--height", type=click.FloatRange(1, 1000), metavar="M",
+    "--height", type=FiniteRange(1, 1000), metavar="M",
     help="mrf: height of the building to the top of its roof, metres.  [default: unknown]",
 )  # fmt: skip
 @click.option(
-    "--storey-height", type=click.FloatRange(1, 20), metavar="M",
+    "--storey-height", type=FiniteRange(1, 20), metavar="M",
     help="mrf: height of a storey, metres.  [default: unknown; taken to be 3]",
 )  # fmt: skip
 @click.option(

@@ -16,7 +16,7 @@ from . import _options
 @click.option(
     "--min-distance",
     metavar="D",
-    type=click.FloatRange(0),
+    type=_options.FiniteRange(0),
     default=0.0,
     show_default=True,
     help="Root mean square distance, in standard deviations a coordinate, that samples keep from "

@@ -73,6 +73,27 @@ class ItemStage:
             raise type(error)(f"{_place(item)}: {artifact.id}: {error}") from None
 
 
+@dataclass
+class Faults:
+    """Takes the errors of items: raises the first one, or reports each where --on-error skips."""
+
+    stage: str
+    on_error: str
+    count: int = 0
+
+    def __call__(self, error: Exception) -> None:
+        """Take one error; a bug is never skipped."""
+        if self.on_error == "stop" or not isinstance(error, FacadeError):
+            raise error
+        say_error(self.stage, error)
+        self.count += 1
+
+    def complain(self) -> None:
+        """Raise InvalidInput if anything was left out."""
+        if self.count:
+            raise InvalidInput(f"{self.count} bad items were skipped")
+
+
 def _place(item: RawItem) -> str:
     return item.source if item.line is None else f"{item.source}:{item.line}"
 

@@ -44,6 +44,8 @@ def command(
 ) -> None:
     """Draw attribute vectors of new buildings from a model (FW16 5, 7), or complete a partial one.
 
+    A model of a table (learn --groups) gives rows of that table, as CSV.
+
     \b
     Example:
       facade sample model.json -n 20 --seed 7 -o attributes.jsonl
@@ -53,7 +55,7 @@ def command(
 
     from ._learning import Drawing, load_model, read_given, write_samples
 
-    loaded, source = load_model(model)
+    loaded, source = load_model(model, tables=given is None)
     known, sources = read_given(given)
     recorded = {"style": style, "top": top, "min_distance": min_distance, "smooth": smooth}
     provenance = Provenance("sample", seed, recorded, (source, *sources))

@@ -97,6 +97,17 @@ def read_all(paths: Iterable[str], *kinds: str) -> tuple[list[Any], tuple[Source
     return artifacts, tuple(sources)
 
 
+def read_whole(path: str, stdin: BinaryIO | None = None) -> RawItem:
+    """Return a whole file that is no artifact (a table), or standard input where `path` is `-`."""
+    if path == "-":
+        return _whole(stdin or sys.stdin.buffer, path, False)
+    try:
+        with Path(path).open("rb") as file:
+            return _whole(file, path, False)
+    except OSError as error:
+        raise unreadable(path, error) from None
+
+
 def digest(path: str) -> Source:
     """Return name and digest of a whole input: of a folder, over its files' names and digests."""
     place = Path(path)

@@ -90,7 +90,8 @@ class _Tally:
             return
         for identity, data in outcome.value.rows:
             if not self.seen.add(identity):
-                self._refuse(InvalidInput(f"id {identity!r} stands twice; expected unique ids"))
+                message = f"id {identity!r} stands twice; expected unique ids"
+                self._refuse(InvalidInput(message, outcome.value.place))
                 continue
             write(identity, data)
         self.kinds += outcome.value.kinds

@@ -13,12 +13,13 @@ import click
 
 from facade_tools.artifacts.provenance import Provenance, Source
 from facade_tools.artifacts.store import RawItem, digest, read_one, read_raw, read_whole
+from facade_tools.artifacts.writing import check_target, write_bytes
 from facade_tools.errors import InvalidInput, Place
 from facade_tools.parallel import map_ordered
 
 from ._options import StreamOptions
 from ._report import Progress
-from ._stream import Faults, one_by_one, open_sink, write_result
+from ._stream import Faults, is_folder, one_by_one, open_sink, write_result
 
 if TYPE_CHECKING:
     from facade_tools.artifacts.attributes import Attributes
@@ -221,6 +222,7 @@ def run_learn(
     from facade_tools.exteriors.table import learn_table
     from facade_tools.randomness import item_generator
 
+    check_outputs(stream.output, report)
     recorded = {"variant": variant, "faithful": faithful, "restarts": restarts}
     seed = stream.seed or 0
     rng = item_generator(seed, "learn")
@@ -247,6 +249,17 @@ def run_learn(
     faults.complain()
 
 
+def check_outputs(output: str | None, report: str | None) -> None:
+    """Raise UsageError or OutputFailed, before anything is learned, where no output could be."""
+    files = [] if output in (None, "-") or is_folder(str(output)) else [Path(str(output))]
+    if report is not None:
+        files.append(Path(report))
+    if len({path.resolve() for path in files}) < len(files):
+        raise click.UsageError(f"{report}: expected another file for the report than for the model")
+    for path in files:
+        check_target(path)
+
+
 def compare(rows: list[Attributes], options: Any, splits: int, seed: int) -> Any:
     """Print the held-out table of all variants on standard error and return it."""
     from facade_tools.exteriors.holdout import compare_variants, table_lines, training_curve
@@ -261,7 +274,6 @@ def compare(rows: list[Attributes], options: Any, splits: int, seed: int) -> Any
 
 def write_report(model: Model, rows: list[Attributes], table: Any, path: str, seed: int) -> None:
     """Write the HTML report of a model, with two buildings of each style."""
-    from facade_tools.artifacts.writing import write_bytes
     from facade_tools.exteriors.report import report_page
     from facade_tools.exteriors.style_pictures import style_pictures
 

@@ -177,6 +177,45 @@ def test_a_model_of_other_names_is_refused(
     assert done.stderr.count(b"\n") == 1
 
 
+@pytest.mark.parametrize(
+    ("words", "code", "message"),
+    [
+        (["--report", "x.json", "-o", "./x.json"], 2, "another file for the report"),
+        (["--report", "no/folder/x.html", "-o", "x.json"], 1, "no/folder/x.html: cannot be"),
+        (["-o", "no/folder/x.json"], 1, "no/folder/x.json: cannot be"),
+    ],
+)
+def test_outputs_that_cannot_be_are_refused_before_learning(
+    facade_here, monkeypatch, tmp_path, attributes, words, code, message
+):
+    import facade_tools.exteriors.learning as learning
+
+    monkeypatch.setattr(learning, "learn_model", lambda *_, **__: pytest.fail("learned"))
+    done = facade_here("learn", attributes, *words, cwd=tmp_path)
+    assert done.returncode == code
+    assert message in done.stderr.decode()
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("stage", ["learn", "evaluate"])
+def test_an_id_that_stands_twice_is_refused_by_its_line(facade_here, model, attributes, stage):
+    words = (stage, model) if stage == "evaluate" else (stage,)
+    done = facade_here(*words, attributes, "-", stdin=attributes.read_bytes().splitlines()[3])
+    assert done.returncode == 3
+    assert done.stderr.decode().startswith(f"facade {stage}: error: -:1: id ")
+
+
+@pytest.mark.parametrize("number", [".nan", ".inf", "-.inf"])
+def test_a_number_that_is_none_is_refused_by_its_pointer(facade_here, tmp_path, model, number):
+    partial = tmp_path / "partial.yaml"
+    partial.write_text(
+        f"schema: facade-tools/attributes/1\nid: mine\nmass: {{bbox: [12.5, {number}, null]}}\n"
+    )
+    done = facade_here("sample", model, "--given", partial)
+    assert done.returncode == 3
+    assert f"{partial}: /mass/bbox/1: " in done.stderr.decode()
+
+
 def test_nothing_observed_is_invalid(facade_script, folder, model):
     (folder / "empty.json").write_text('{"schema": "facade-tools/attributes/1", "id": "e"}')
     run(facade_script, "evaluate", model, folder / "empty.json", code=3)

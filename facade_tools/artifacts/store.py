@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from ..errors import InvalidInput
-from .documents import decode, parse_json, parse_yaml
+from .documents import check_finite, decode, parse_json, parse_yaml
 from .provenance import Source
 
 MAX_DOCUMENT_BYTES = 512 << 20
@@ -33,6 +33,7 @@ class RawItem:
             if not self.yaml:
                 return parse_json(self.data)
             document = parse_yaml(self.data)
+            check_finite(document)
         except InvalidInput as error:
             raise error.at(self.source, self.line) from None
         if implied and isinstance(document, dict) and "schema" not in document:

@@ -10,7 +10,8 @@ from typing import Any
 from ..artifacts.numbers import canonical
 from .drawing import Block, Source, block_ids
 from .layout import Layout
-from .table import ID, columns_of
+from .table import columns_of
+from .table_groups import ID
 
 
 def table_header(layout: Layout) -> bytes:

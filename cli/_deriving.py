@@ -24,7 +24,7 @@ from ._items import each
 from ._lots import Ground, grounds
 from ._models import Made, Wanted, wanted, write_models
 from ._options import StreamOptions
-from ._stream import side_input
+from ._stream import refuse_overwriting, refuse_single, side_input
 
 NAME = "derive"
 
@@ -32,6 +32,10 @@ NAME = "derive"
 def run_derive(grammar: str, stream: StreamOptions, values: Mapping[str, Any]) -> None:
     """Derive all buildings and write them."""
     footprint, given = values["footprint"], dict(map(_value, values["given"]))
+    outputs = (stream.output, values["tree"])
+    for output in outputs:
+        refuse_single(output, values["count"], "buildings")
+    refuse_overwriting([grammar, footprint], outputs)
     sources = (
         *(side_input(grammar) if grammar not in builtin_names() else ()),
         *(side_input(footprint) if footprint != "-" else ()),

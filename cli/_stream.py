@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager
@@ -212,6 +213,30 @@ def file_name(identity: str) -> str:
     """Return a file name for an item's id: what could leave the folder is replaced."""
     safe = "".join(c if c.isalnum() or c in "-_.+@" else "_" for c in identity)
     return safe.lstrip(".") or "_"
+
+
+def refuse_single(output: str | None, count: int, noun: str) -> None:
+    """Raise UsageError where one .json file is to take several artifacts."""
+    if count > 1 and _single(output):
+        raise click.UsageError(f"{output}: several {noun}; name a .jsonl file or a folder")
+
+
+def refuse_overwriting(read: Iterable[str | None], written: Iterable[str | None]) -> None:
+    """Raise UsageError where a file that is written is one that is read, or is written twice.
+
+    For stages whose results are of another kind than what they read; None and `-` are no files.
+    """
+    sources = {os.path.realpath(path) for path in read if path not in (None, "-") and path}
+    seen: set[str] = set()
+    for path in written:
+        if not path or path == "-":
+            continue
+        place = os.path.realpath(path)
+        if place in sources:
+            raise click.UsageError(f"{path}: is an input and would be overwritten; name another")
+        if place in seen:
+            raise click.UsageError(f"{path}: would be written twice; name another")
+        seen.add(place)
 
 
 def write_result(artifact: Any, output: str | None) -> None:

@@ -30,8 +30,9 @@ METHODS = {
     "window stripes, nothing learned (KSTTP09).",
 )  # fmt: skip
 @click.option(
-    "--solver", type=click.Choice(["dp", "walk"]), default="dp", show_default=True,
-    help="dp: exact in turn over rows and columns; walk: the paper's random walk.",
+    "--solver", type=click.Choice(["dp", "walk"]),
+    help="forest: dp, exact in turn over rows and columns; walk, the paper's random walk.  "
+    "[default: dp]",
 )  # fmt: skip
 @click.option(
     "--height", type=FiniteRange(1, 1000), metavar="M",

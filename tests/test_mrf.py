@@ -363,6 +363,7 @@ def test_the_command_writes_a_parse_and_its_pictures(tmp_path, facade_here):
 
 @pytest.mark.parametrize("options", [
     ("--method", "mrf", "--grammar", "plain"), ("--method", "forest", "--height", "12"),
+    ("--method", "mrf", "--solver", "walk"),
 ])  # fmt: skip
 def test_options_of_another_method_are_refused(options, facade_here):
     done = facade_here("parse-image", "front.png", *options)

@@ -406,3 +406,54 @@ def test_a_rectified_photograph_keeps_its_name_and_homography(facade_here, tmp_p
     other = facade_here("parse-image", straight, "--rectify", report)
     assert other.returncode == 3
     assert b"another picture" in other.stderr
+
+
+@pytest.mark.parametrize("method", ["forest", "mrf"])
+def test_a_mask_of_another_size_is_refused(method, facade_here, photos, tmp_path):
+    mask = tmp_path / "mask.png"
+    mask.write_bytes(png(np.zeros((10, 12), np.uint8)))
+    for more in ((), ("--rectify", "1,1 88,1 88,118 1,118")):
+        words = ("parse-image", photos / "noise.png", "--method", method, "--mask", mask, *more)
+        done = facade_here(*words)
+        assert (done.returncode, done.stdout) == (3, b"")
+        message = "noise.png: the mask has 12×10 pixels, the picture 90×120; expected the same"
+        assert message.encode() in done.stderr
+
+
+@pytest.mark.parametrize("option", ["--labels", "--raw-labels", "--overlay", "-o"])
+def test_pictures_of_one_name_do_not_overwrite_each_other(option, facade_here, photos, tmp_path):
+    other = tmp_path / "flat.bmp"
+    other.write_bytes(cv2.imencode(".bmp", gradient())[1].tobytes())
+    done = facade_here("parse-image", photos / "flat.png", other, option, tmp_path / "out/")
+    assert (done.returncode, done.stdout) == (3, b"")
+    assert b"id 'flat' stands twice" in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("words", [
+    ("flat.png", "--overlay", "flat.png"), ("flat.png", "-o", "flat.png"),
+    ("flat.png", "noise.png", "--labels", "."), (".", "--raw-labels", "../photos/"),
+    ("flat.png", "--mask", "mask.png", "--labels", "mask.png"),
+    ("flat.png", "--labels", "x.png", "--overlay", "./x.png"),
+])  # fmt: skip
+def test_no_result_overwrites_an_input_or_another_result(words, facade_here, photos, tmp_path):
+    folder = tmp_path / "photos"
+    folder.mkdir()
+    for path in photos.iterdir():
+        (folder / path.name).write_bytes(path.read_bytes())
+    (folder / "mask.png").write_bytes(png(np.zeros((80, 60), np.uint8)))
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    done = facade_here("parse-image", *words, cwd=folder)
+    assert (done.returncode, done.stdout) == (2, b"")
+    assert b"would be" in done.stderr
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+@pytest.mark.parametrize("words", [
+    ("flat.png", "--rectify", "1,2"), ("flat.png", "--rectify", "Auto"),
+    ("flat.png", "noise.png", "-o", "two.json"),
+])  # fmt: skip
+def test_mistakes_of_usage_come_before_any_picture(words, facade_here, photos):
+    done = facade_here("parse-image", *words, cwd=photos)
+    assert (done.returncode, done.stdout) == (2, b"")
+    assert not (photos / "two.json").exists()

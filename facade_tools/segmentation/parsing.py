@@ -18,7 +18,7 @@ from ..grammar.library import DEFAULT
 from ..grammar.library import load as load_grammar
 from ..grammar.plan import Plan
 from ..grammar.plan import plan as make_plan
-from ..grammar.reading import Method, Reading, ReadOptions, label_index
+from ..grammar.reading import Method, Reading, ReadOptions, label_index, shrunk_mask
 from ..imaging.features_context import Probabilities
 from ..imaging.image_io import Photo
 from . import dp, walk
@@ -143,11 +143,4 @@ def _hidden(
     """Return where an occluder hides the facade at working size: nowhere without a mask."""
     if mask is None:
         return np.zeros(working, np.bool_)
-    if mask.shape != shape:
-        raise InvalidInput(
-            f"the mask has {mask.shape[1]}×{mask.shape[0]} pixels, the picture other"
-        )
-    size = (working[1], working[0])
-    area = cv2.resize(mask.astype(np.float32), size, interpolation=cv2.INTER_AREA)
-    covered: NDArray[np.bool_] = area > 0.5
-    return covered
+    return shrunk_mask(mask, shape, working)

@@ -383,6 +383,20 @@ BAD = [
     ("extrude: 3,", "extrude: 3, scale: {x: -1},", "size of -1 m", 6),
     ("split: x,", "split: x, repeat: x, each: 2,", "at once", 8),
     ("axiom: Lot", "axiom: Wall", "has no rule", 3),
+    ("extrude: 3,", "extrude: .nan,", "is no finite number", 6),
+    ("extrude: 3,", "extrude: 1e7,", "has a size of 1e+07 m", 6),
+    ("extrude: 3,", "translate: {x: 1e15}, extrude: 3,", "lies 1e+15 m away", 6),
+    ("{width: 8,", "{width: 1e9,", "expected at most 1e+06 m", 4),
+    ("extrude: 3,", "extrude: 1e5,", "more than 1000 storeys of 3 m", 2),
+    ("{label: window}", "{label: window, style: pig}", "'pig' is no style of a window", 9),
+    (
+        "faces: {front: Front, side: Wall, top: Wall}", "roof: gable, pitch: 89, into: {all: Wall}",
+        "89 is no pitch from 0 to 88°", 7,
+    ),
+    (
+        "faces: {front: Front, side: Wall, top: Wall}",
+        "roof: mansard, rise: [2, -1], into: {all: Wall}", "-1 is no rise of at least 0 m", 7,
+    ),
 ]  # fmt: skip
 
 

@@ -109,7 +109,7 @@ def test_pictures_without_structure_are_refused(kind):
         [[0, 0], [0, 10], [10, 10], [10, 0]],
         [[0, 0], [np.nan, 0], [10, 10], [0, 10]],
         [[30, 0], [40, 0], [40, 10], [30, 10]],
-        [[30, -20], [60, 10], [40, 30], [10, 0]] + np.array([15, -15]),
+        [[45, -35], [75, -5], [55, 15], [25, -15]],
     ],
 )
 def test_corners_that_are_no_quadrilateral_are_refused(corners):

@@ -97,7 +97,9 @@ def in_cells(photo: Photo, scale: Scale, mask: NDArray[np.bool_] | None = None) 
     """
     working = fitted(photo.pixels, ROWS, PIXELS)
     if min(working.shape[:2]) < LEAST_SIDE:
-        raise Infeasible(f"the picture is too small; expected at least {LEAST_SIDE} pixels a side")
+        height, width = working.shape[:2]
+        size = f"{width}×{height} pixels at working size"
+        raise Infeasible(f"the picture is too small: {size}; expected {LEAST_SIDE} a side or more")
     hidden = None if mask is None else shrunk_mask(mask, photo.pixels.shape, working.shape)
     evidence = window_evidence(working, hidden)
     height = len(working)

@@ -177,6 +177,28 @@ def test_one_json_file_holds_one_artifact(facade, tmp_path):
     assert (tmp_path / "x.json").read_bytes().count(b"\n") > 10
 
 
+@pytest.mark.parametrize(("stage", "name"), [
+    ("export", "a.city.json"), ("import", "a.city.json"), ("import", "./b/../a.city.json"),
+    ("reconstruct", "a.json"),
+])  # fmt: skip
+def test_results_of_another_kind_do_not_overwrite_their_input(facade_here, tmp_path, stage, name):
+    (tmp_path / "b").mkdir()
+    path = tmp_path / name
+    path.write_text("{}")
+    done = facade_here(stage, path.resolve(), "-o", name, cwd=tmp_path)
+    assert done.returncode == 2, done.stderr
+    assert b"is an input and would be overwritten" in done.stderr
+    assert path.read_text() == "{}"
+
+
+def test_a_stage_from_json_to_json_may_replace_its_input(facade_here, tmp_path):
+    path = tmp_path / "house.jsonl"
+    path.write_bytes(BUNGALOWS.read_bytes())
+    assert facade_here("attributes", path, "-o", path).returncode == 0
+    assert facade_here("validate", path).returncode == 0
+    assert json.loads(path.read_bytes().splitlines()[0])["schema"] == "facade-tools/attributes/1"
+
+
 def test_ids_cannot_leave_the_folder(facade, tmp_path):
     row = json.loads(BUNGALOWS.read_text().splitlines()[0])
     row["id"] = "../../evil"

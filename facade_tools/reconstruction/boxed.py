@@ -28,6 +28,7 @@ LEAST = 0.25  # metres, a smaller element is left out
 PLANE = 0.8  # metres off its wall at which an element still belongs to it
 MOST_TRIES = 60  # elements that may be dropped to meet the rules of buildings
 MOST_STOREYS = 1000
+MOST_PIECES = 200_000
 DORMER = 8.0  # m², a smaller volume on a roof is a dormer, no box
 
 
@@ -70,9 +71,13 @@ def derived_building(
 
 def _check_storeys(boxes: Sequence[Box], storey: float) -> None:
     """Raise InvalidInput where the pieces of the storeys would fill the memory."""
-    top = max(box.height or 0.0 for box in boxes)
-    if not top <= MOST_STOREYS * storey:
-        message = f"{top:g} m are more than {MOST_STOREYS} storeys of {storey:g} m"
+    heights = [box.height or 0.0 for box in boxes]
+    if not max(heights) <= MOST_STOREYS * storey:
+        message = f"{max(heights):g} m are more than {MOST_STOREYS} storeys of {storey:g} m"
+        raise InvalidInput(message, pointer="/storey_height")
+    pieces = round(sum(len(SIDES) * max(1.0, height / storey) for height in heights))
+    if pieces > MOST_PIECES:
+        message = f"{len(boxes)} boxes have some {pieces:,} pieces of wall; at most {MOST_PIECES:,}"
         raise InvalidInput(message, pointer="/storey_height")
 
 

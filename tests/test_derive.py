@@ -420,7 +420,7 @@ def test_towers_of_too_many_pieces_are_refused_before_they_are_made():
         "  - {symbol: Strip, do: [{extrude: 2000 + index, into: Wall}]}",
     ).replace("width: 8", "width: 80")
     made = derived(towers)
-    with pytest.raises(InvalidInput, match="100 boxes have some .* pieces of wall") as error:
+    with pytest.raises(InvalidInput, match=r"100 boxes have some .* pieces of wall") as error:
         derived_building(made, "x", 3.0)
     assert error.value.place.pointer == "/storey_height"
 

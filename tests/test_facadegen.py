@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from facade_tools.artifacts.attributes import FacadeAttributes
-from facade_tools.artifacts.building import SIDES, Box, Building, Colors, Roof
+from facade_tools.artifacts.building import SIDES, Box, Building, Colors, Element, Facade, Roof
 from facade_tools.artifacts.documents import encode
 from facade_tools.artifacts.numbers import dump_line
 from facade_tools.artifacts.store import read
@@ -227,6 +227,42 @@ def test_known_element_without_a_wall_is_infeasible():
     keep = replace(whole, partial=True)
     with pytest.raises(Infeasible, match="known"):
         made(replace(bare(whole), boxes=(far, *whole.boxes[1:])), keep=keep)
+
+
+def _moved(building: Building, by: float) -> Building:
+    """A partial building of the front alone, all of its elements known and moved along."""
+    pieces = tuple(
+        replace(p, elements=tuple(replace(e, u=e.u + by, known=True) for e in p.elements))
+        for p in building.facades["front"].pieces
+    )
+    return replace(building, facades={"front": Facade(pieces)}, partial=True)
+
+
+def test_known_elements_that_overlap_are_infeasible():
+    mass = bare(sample("two_storey_gable", 1))
+    seen = _moved(sample("two_storey_gable", 1), 0.0)
+    shifted = _moved(sample("two_storey_gable", 1), 0.03)
+    with pytest.raises(Infeasible, match="overlap"):
+        made(replace(mass, facades=seen.facades), keep=shifted)
+
+
+def test_two_known_main_doors_are_infeasible():
+    whole = sample("two_storey_gable", 1)
+    left, *others = whole.facades["left"].pieces
+    door = Element("door", "panel", 1.0, 0.0, 0.9, 2.1, main=True)
+    doubled = replace(left, elements=(door,))
+    sides = {"front": whole.facades["front"], "left": Facade((doubled, *others))}
+    with pytest.raises(Infeasible, match="both main doors"):
+        made(bare(whole), keep=replace(whole, facades=sides, partial=True))
+
+
+def test_element_known_twice_to_the_millimetre_is_one():
+    mass = bare(sample("two_storey_gable", 1))
+    seen, again = (_moved(sample("two_storey_gable", 1), by) for by in (0.0, 5e-4))
+    (house,) = made(replace(mass, facades=seen.facades), keep=again)
+    assert [e for side, _, e in elements(house) if side == "front"] == [
+        e for _, _, e in elements(again)
+    ]
 
 
 # --- roofs before walls -------------------------------------------------------------------------

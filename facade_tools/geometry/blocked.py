@@ -69,6 +69,22 @@ def blocked_rectangles(building: Building, side: Side, piece: Piece) -> Rectangl
     return np.array(rows, dtype=np.float64).reshape(-1, 4)
 
 
+def porch_strips(building: Building, porch: Box, side: Side, piece: Piece) -> Rectangles:
+    """Return the parts (n, 4) of a piece behind the posts and the roof of a porch: u0, v0, u1, v1.
+
+    >>> from facade_tools.artifacts.building import Roof
+    >>> house = Box("h", "general", 5, 4, 10, 8, 3)
+    >>> porch = Box("p", "porch", 5, -1, 4, 2, 2.5, Roof("flat"))
+    >>> wall = Piece("front-1", "h", (0, 0, 0), 10, 3)
+    >>> posts = porch_strips(Building("b", (house, porch)), porch, "front", wall)[-2:]
+    >>> posts.round(1).tolist()
+    [[5.5, 0.0, 5.7, 2.5], [6.8, 0.0, 7.0, 2.5]]
+    """
+    wall = wall_of(side, piece)
+    rows = [*_roof_strips(porch, wall, piece), *_post_strips(building, porch, wall, piece)]
+    return np.array(rows, dtype=np.float64).reshape(-1, 4)
+
+
 def roof_height(box: Box, points: Points2) -> Floats:
     """Return the height (m) of a box's roof over plan points (n, 2); NaN beyond its overhang.
 

@@ -27,6 +27,7 @@ STRIP = 0.25  # a sloping roof line is covered by strips of at most this width (
 OUTSIDE = 0.02  # how far in front of the wall the roofs are cut (m)
 UNDER = 0.12  # thickness of a roof below its eaves (m)
 OVER = 0.05  # air above a roof (m)
+SLAB = 0.15  # thickness of the slab on a roof that runs into the wall (m)
 BESIDE = 1e-3  # roofs are cut this far within a strip: at its ends a neighbour may begin (m)
 NEAR = 1e-6
 
@@ -155,7 +156,7 @@ def _buried_strips(
             u0 <= left + NEAR and right <= u1 + NEAR and v0 <= 0.0 and v1 >= high + OVER - BESIDE
             for u0, v0, u1, v1 in known
         ):
-            yield left, -UNDER, right, high + OVER
+            yield left, -UNDER, right, high + SLAB + OVER
 
 
 def built_height(boxes: tuple[Box, ...], points: Points2) -> Floats:

@@ -118,6 +118,10 @@ def test_storey_height_of_the_known_part_stays():
     seen = Building("seen", (MAIN,), storey_height=2.7, partial=True)
     (building,) = generate_mass(WANTED, rng=np.random.default_rng(0), keep=seen)
     assert building.storey_height == building.targets.storey_height == 2.7
+    silent = replace(seen, storey_height=3.0)
+    wanted = replace(WANTED, storey_height=2.8)
+    (building,) = generate_mass(wanted, rng=np.random.default_rng(0), keep=silent)
+    assert building.storey_height == 2.8
 
 
 def test_no_new_box_hides_a_known_one():

@@ -29,6 +29,7 @@ from .mass_roofs import (
     with_tower,
 )
 from .mass_search import new_pool, pooled
+from .relations import DEFAULT_STOREY
 
 log = logging.getLogger("facade_tools.massgen")
 
@@ -64,13 +65,14 @@ def generate_mass(
     """Yield buildings (boxes and roofs, no facades) whose mass attributes are those wanted.
 
     Unknown attributes leave the search free. keep: boxes that stay exactly as they are, with
-    what is `complete`, and its storey height; their unknown heights and roofs are filled in.
+    what is `complete`, and its storey height where it states one (not the default) or shows walls;
+    their unknown heights and roofs are filled in.
     candidates: how many, in order of energy, mutually different (see `mass_candidates`). require:
     raises Infeasible where the best energy is above it, and in any case where there is no mass.
     model: attributes that `keep` contradicts are drawn from it anew, given the others.
     `energy.residuals` names the groups that the result misses.
     """
-    if keep is not None:
+    if keep is not None and (keep.facades or keep.storey_height != DEFAULT_STOREY):
         attributes = replace(attributes, storey_height=keep.storey_height)
     target = search_target(attributes, keep, rng=rng)
     masses = find_masses(target, keep, candidates, rng=rng)

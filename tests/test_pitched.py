@@ -86,6 +86,35 @@ def test_the_mass_is_one_closed_solid_with_its_roof(style, turned):
     assert solid.volume == pytest.approx(whole.volume, rel=1e-5)
 
 
+def test_no_slit_is_left_under_the_attic(style):
+    """Wings whose eaves are not the walls' heights to the last digit."""
+    boxes = (
+        Box("main", "general", 6.6, 4.6, 13.2, 9.2, 6.0, Roof("gable", 37, "x", 0.3)),
+        Box("east", "general", 15.1, 4.6, 3.8, 6.2, 3.0, Roof("gable", 28, "x", 0.25)),
+        Box("west", "general", -1.9, 4.6, 3.8, 6.2, 3.0, Roof("gable", 28, "x", 0.25)),
+    )
+    (mass,) = parts(dressed(style, Building("house", boxes)), "mass")
+    written = trimesh.Trimesh(mass.vertices.astype(np.float32), mass.faces, process=True)
+    assert written.is_volume
+
+
+@pytest.mark.parametrize("place", [0.0, 300.0])
+def test_the_mass_under_a_cone_stays_closed_in_single_precision(style, place):
+    """A tower's cone in the valley of two roofs, as on the sample houses."""
+    boxes = (
+        Box("main", "general", 5.1, 5.3, 10.2, 10.6, 6.4, Roof("hip", 44, "y", 0.35)),
+        Box("tower", "general", 9.5, 0.7, 3.2, 3.2, 7.2, Roof("cone", 60, "x", 0.2)),
+        Box("cross", "general", -0.2, 6.54, 2.4, 4.6, 6.4, Roof("gable", 44, "x", 0.35)),
+        Box("rear", "general", 4.6, 12.2, 7.2, 3.2, 3.2, Roof("hip", 25, "x", 0.3)),
+    )
+    frame = Frame(0.0, (place, place, 0.0)) if place else None
+    (mass,) = parts(dressed(style, Building("house", boxes, frame=frame)), "mass")
+    written = trimesh.Trimesh(mass.vertices.astype(np.float32), mass.faces, process=True)
+    assert written.is_volume
+    assert len(written.faces) == len(mass.faces)
+    assert len(np.unique(mass.faces)) == len(mass.vertices)
+
+
 def test_the_roof_turns_with_the_building(style):
     plain = house(Roof("gable", 30, "x"))
     placed = house(Roof("gable", 30, "x"), frame=Frame(rotation=90.0, shift=(100.0, 50.0, 0.0)))

@@ -185,6 +185,33 @@ def test_storeys_are_inserted_not_stretched():
         assert placed.storeys[-1].top == pytest.approx(own.z + height)
 
 
+def test_storeys_of_a_model_that_is_not_in_metres_are_inserted():
+    parts = []
+    for k in range(6):
+        parts.append(textured_box((0, 0, 1.5 * k), (8, 5, 1.5 * k + 1.2)))
+        parts.append(textured_box((0.4, 0.4, 1.5 * k + 1.2), (7.6, 4.6, 1.5 * k + 1.5)))
+    style = style_of(joined(parts))
+    own = style.blocks.blocks[0]
+    target = replace(style.blocks, blocks=(replace(own, height=13.5),))
+    assert len(placed_blocks(style.sheet, style.blocks, target)[0].storeys) == 18
+
+
+def test_sign_boards_and_mouldings_are_no_storeys():
+    """Two boards of 0.8 m with a joint of 0.2 m each, on a wall that grows to its double."""
+    levels = [(0, 3.4), (0.3, 0.2), (0.15, 0.8), (0.3, 0.2), (0.15, 0.8), (0, 4.6)]
+    parts, z = [], 0.0
+    for inset, height in levels:
+        low, high = (inset, inset, z), (16 - inset, 10 - inset, z + height)
+        parts.append(textured_box(low, high))
+        z += height
+    style = style_of(joined(parts))
+    own = max(style.blocks.blocks, key=lambda block: block.height)
+    target = replace(style.blocks, blocks=(replace(own, height=20.0),))
+    floors = [floor for floor in style.sheet.floors if floor.block == own.id]
+    assert len(floors) > 4
+    assert len(placed_blocks(style.sheet, style.blocks, target)[0].storeys) == len(floors)
+
+
 # --- overhangs, snapping, re-assignment -----------------------------------------------------------
 def recessed():
     """A block with a recess 2 m deep in the middle of its front, under nothing."""

@@ -24,6 +24,9 @@ TOUCH = 1e-6  # m
 SUPPORT = 0.9  # of the distance of the outer boundaries: thickness of a wall under an overhang
 FLUSH = 0.05  # m: walls nearer than that stand in one plane, and thinning would take all relief
 SAME = 0.02  # share of the plan, of the height: storeys that differ less are one storey repeated
+LEAST_STOREY = 2.0  # m
+SMALL_STOREY = 1 / 60  # of the highest block, in a model that is not in metres
+MOSTLY = 0.5  # of a block's height, that storeys in such a model make up
 Knots = tuple[Floats, Floats]
 
 
@@ -154,8 +157,10 @@ def _run_of_storeys(sheet: StyleSheet, floors: Sequence[int]) -> tuple[int, int,
     """Return first floor, floors a storey, and number of storeys of the highest run of like ones.
 
     A storey may be several slabs (a window band, a parapet); like ones agree in height and plan.
+    Sign boards and mouldings that lie on each other like storeys are none: they are too low.
     """
     plans = [_plan(sheet.floors[i]) for i in floors]
+    whole = sum(plan.height for plan in plans)
     best = (0.0, 0, 1, 1)
     for unit in range(1, min(6, len(plans) // 2) + 1):
         like = [_like(plans[k], plans[k + unit]) for k in range(len(plans) - unit)]
@@ -165,10 +170,20 @@ def _run_of_storeys(sheet: StyleSheet, floors: Sequence[int]) -> tuple[int, int,
                 continue
             repeats = (k - start) // unit + 1 if k > start else 1
             height = sum(plan.height for plan in plans[start : start + unit * repeats])
-            if repeats > 1 and height > best[0] * 1.01:
+            high = height / repeats >= _least_storey(sheet, whole, height)
+            if repeats > 1 and high and height > best[0] * 1.01:
                 best = (height, start, unit, repeats)
             start = k + 1
     return best[1:]
+
+
+def _least_storey(sheet: StyleSheet, block: float, run: float) -> float:
+    """Return the least height (m) of a storey, of which a run (m) stands in a block (m high).
+
+    Where they are most of the block, storeys may be lower: the model need not be in metres.
+    """
+    highest = max(source.size[2] for source in sheet.blocks)
+    return min(LEAST_STOREY, SMALL_STOREY * highest) if run > MOSTLY * block else LEAST_STOREY
 
 
 def _plan(floor: StyleFloor) -> Slab:

@@ -106,8 +106,9 @@ class Dresser:
         ]
         if plain:
             blocks = with_ends(blocks, chosen.blocks)
-        scene = retarget(chosen, blocks, self.small)
-        if building is not None and not self.sizes:
+        roofed = building is not None and not self.sizes
+        scene = retarget(chosen, blocks, self.small, flush=roofed)
+        if building is not None and roofed:
             scene = crowned(scene, chosen, building)
         return base.id, scene
 

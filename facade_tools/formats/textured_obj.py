@@ -59,6 +59,8 @@ def _parsed(text: str, name: str) -> _Content:
                 paint = _paint_index(content, rest.strip())
             elif word == "mtllib":
                 content.libraries.append(rest.strip())
+        except InvalidInput as error:
+            raise error.at(name, number) from None
         except (ValueError, IndexError):
             place = Place(name, number)
             raise InvalidInput(f"{line.strip()[:60]!r} is no OBJ statement", place) from None
@@ -68,7 +70,7 @@ def _parsed(text: str, name: str) -> _Content:
 def _position(rest: str) -> tuple[float, ...]:
     position = tuple(map(float, rest.split()[:3]))
     if len(position) != 3 or not all(map(math.isfinite, position)):
-        raise ValueError(rest)
+        raise InvalidInput("vertices need three finite coordinates")
     return position
 
 

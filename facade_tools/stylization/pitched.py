@@ -19,6 +19,7 @@ from ..geometry.triangulate import newell_normal
 from ..imaging.image_io import Picture
 from .atlas import encoded_page
 from .bases import frame_of
+from .placing import TOUCH
 from .retarget import RAISED, framed
 from .splitting import SplitRule
 from .style import Style, group_rule
@@ -62,26 +63,27 @@ def crowned(scene: Scene, style: Style, building: Building) -> Scene:
 def _under_roof(walls: Mesh, building: Building, solid: Solid) -> Mesh:
     """Return the closed walls with the attic on them as one closed mesh.
 
-    Walls end at heights rounded to a tenth of a millimetre. Where that leaves a slit below the
-    attic that single precision closes, the attic begins a little lower.
+    Walls end at heights rounded to a tenth of a millimetre, and boxes stand where rounding lets
+    them. Where that leaves a slit below the attic or a film of it on a wall, which single precision
+    closes, the boxes that are cut from it are a little wider, then lower.
     """
     found = walls
-    for lap in (0.0, LAP):
-        attic = framed(_attic(building, solid, lap), frame_of(building))
+    for wider, lower in ((0.0, 0.0), (TOUCH, 0.0), (TOUCH, LAP)):
+        attic = framed(_attic(building, solid, wider, lower), frame_of(building))
         found = _united(walls, attic)
         if _simple(_as_written(found)):
             break
     return found
 
 
-def _attic(building: Building, solid: Solid, lap: float) -> Mesh:
-    """Return what of the solid lies above the eaves of its boxes, or `lap` (m) below them."""
+def _attic(building: Building, solid: Solid, wider: float, lower: float) -> Mesh:
+    """Return what of the solid lies above the eaves of its boxes, made wider and lower (m)."""
     from manifold3d import Manifold, OpType
 
     walls = [
-        Manifold.cube((box.width, box.depth, (box.height or 0.0) + 1.0 - lap)).translate(
-            (box.x - box.width / 2, box.y - box.depth / 2, -1.0)
-        )
+        Manifold.cube(
+            (box.width + 2 * wider, box.depth + 2 * wider, (box.height or 0.0) + 1.0 - lower)
+        ).translate((box.x - box.width / 2 - wider, box.y - box.depth / 2 - wider, -1.0))
         for box in building.boxes
         if box.kind != "porch"
     ]
@@ -91,11 +93,29 @@ def _attic(building: Building, solid: Solid, lap: float) -> Mesh:
 
 
 def _united(walls: Mesh, attic: Mesh) -> Mesh:
-    whole = _mesh((_manifold(walls) + _manifold(attic)).simplify(SLIVER))
+    whole = _filled(_mesh((_manifold(walls) + _manifold(attic)).simplify(SLIVER)))
     if _simple(_as_written(whole)):
         return replace(walls, vertices=whole.vertices, faces=whole.faces)
     used, faces = np.unique(_without_slivers(whole), return_inverse=True)
     return replace(walls, vertices=whole.vertices[used], faces=faces.reshape(-1, 3))
+
+
+def _filled(mesh: Mesh) -> Mesh:
+    """Return a closed mesh without the hollows inside it, which nobody sees."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    count = len(mesh.vertices)
+    a, b, c = mesh.faces.T
+    rows, columns = np.concatenate([a, a]), np.concatenate([b, c])
+    links = coo_array((np.ones(len(rows)), (rows, columns)), shape=(count, count))
+    parts = connected_components(links, directed=False)[1][a]
+    corners = mesh.vertices[mesh.faces] - mesh.vertices.mean(axis=0)
+    volumes = np.bincount(parts, weights=np.linalg.det(corners))
+    if (volumes > 0).all():
+        return mesh
+    used, faces = np.unique(mesh.faces[volumes[parts] > 0], return_inverse=True)
+    return replace(mesh, vertices=mesh.vertices[used], faces=faces.reshape(-1, 3))
 
 
 def _as_written(mesh: Mesh) -> Triangles:

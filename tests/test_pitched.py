@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from facade_tools.formats import gltf
 from facade_tools.formats.textured import joined
 from facade_tools.geometry.solids import building_solid, triangulated
 from facade_tools.stylization.bases import building_blocks
-from facade_tools.stylization.pitched import crowned, plain_wall
+from facade_tools.stylization.pitched import attic, crowned, plain_wall
 from facade_tools.stylization.retarget import RAISED, retarget
 
 
@@ -41,9 +42,10 @@ def flushed(style, building):
 
 @pytest.fixture(scope="module")
 def ornate():
-    """Walls 0.6 m behind a cornice, under a storey that is set back on all sides, with a niche."""
+    """Walls of two depths behind a cornice, a niche, and a storey set back on all sides."""
     boxes = [
-        ((0.6, 0.6, 0), (19.4, 11.4, 3)), ((0, 0, 3), (20, 12, 3.4)),
+        ((0.6, 0.6, 0), (19.4, 11.4, 1.5)), ((0.7, 0.7, 1.5), (19.3, 11.3, 3)),
+        ((0, 0, 3), (20, 12, 3.4)),
         ((0.6, 1.6, 3.4), (19.4, 11.4, 7)), ((0.6, 0.6, 3.4), (7, 1.6, 7)),
         ((13, 0.6, 3.4), (19.4, 1.6, 7)), ((2.5, 2.5, 7), (17.5, 9.5, 9.5)),
     ]  # fmt: skip
@@ -86,6 +88,14 @@ WINGS = (
 )
 
 
+def test_no_film_of_the_attic_hangs_on_the_walls():
+    """Where boxes end otherwise than their parts, by rounding, nothing is left of their walls."""
+    building = Building("house", COLONIAL)
+    solid = building_solid(building)
+    assert attic(building, solid, 0.0, 0.0).vertices[:, 2].min() == 0.0
+    assert attic(building, solid, 1e-6, 0.0).vertices[:, 2].min() == 3.0
+
+
 COLONIAL = (  # 5.6 + 11.2 / 2 is not quite 13.0 - 3.6 / 2
     Box("main", "general", 5.6, 4.5, 11.2, 9.0, 6.0, Roof("gable", 32, "x", 0.3)),
     Box("east", "general", 13.0, 4.5, 3.6, 6.0, 3.0, Roof("gable", 28, "x", 0.25)),
@@ -93,7 +103,10 @@ COLONIAL = (  # 5.6 + 11.2 / 2 is not quite 13.0 - 3.6 / 2
 )
 
 
-@pytest.mark.parametrize("boxes", [WINGS, COLONIAL])
+FLAT = tuple(replace(box, roof=Roof("flat")) for box in COLONIAL)
+
+
+@pytest.mark.parametrize("boxes", [WINGS, COLONIAL, FLAT])
 def test_walls_with_relief_reach_their_roofs_and_neighbours(ornate, boxes):
     """The mass is one body, and as large as the house but for niches and cornices."""
     building = Building("house", boxes)

@@ -45,10 +45,10 @@ def crowned(scene: Scene, style: Style, building: Building) -> Scene:
     pitched = any(box.roof is not None and box.roof.style != "flat" for box in building.boxes)
     crown = crown_scene(building, solid if pitched else None)
     meshes, materials = list(crown.meshes), dict(crown.materials)
+    walls, *bare = scene.meshes  # the mass comes first
+    walls = _under_roof(walls, building, solid) if pitched else _filled(walls)
+    scene = replace(scene, meshes=(walls, *bare))
     if pitched:
-        bare = tuple(mesh for mesh in scene.meshes if mesh.name != "mass")
-        (walls,) = (mesh for mesh in scene.meshes if mesh.name == "mass")
-        scene = replace(scene, meshes=(_under_roof(walls, building, solid), *bare))
         picture, size = plain_wall(style)
         meshes.append(_gables(building, solid, size))
         materials["gable"] = Material("gable", "#ffffff", texture=encoded_page(picture))
@@ -69,14 +69,14 @@ def _under_roof(walls: Mesh, building: Building, solid: Solid) -> Mesh:
     """
     found = walls
     for wider, lower in ((0.0, 0.0), (TOUCH, 0.0), (TOUCH, LAP)):
-        attic = framed(_attic(building, solid, wider, lower), frame_of(building))
-        found = _united(walls, attic)
+        top = framed(attic(building, solid, wider, lower), frame_of(building))
+        found = _united(walls, top)
         if _simple(_as_written(found)):
             break
     return found
 
 
-def _attic(building: Building, solid: Solid, wider: float, lower: float) -> Mesh:
+def attic(building: Building, solid: Solid, wider: float, lower: float) -> Mesh:
     """Return what of the solid lies above the eaves of its boxes, made wider and lower (m)."""
     from manifold3d import Manifold, OpType
 
@@ -92,8 +92,8 @@ def _attic(building: Building, solid: Solid, wider: float, lower: float) -> Mesh
     return _mesh(Manifold.batch_boolean([whole, *walls], OpType.Subtract))
 
 
-def _united(walls: Mesh, attic: Mesh) -> Mesh:
-    whole = _filled(_mesh((_manifold(walls) + _manifold(attic)).simplify(SLIVER)))
+def _united(walls: Mesh, top: Mesh) -> Mesh:
+    whole = _filled(_mesh((_manifold(walls) + _manifold(top)).simplify(SLIVER)))
     if _simple(_as_written(whole)):
         return replace(walls, vertices=whole.vertices, faces=whole.faces)
     used, faces = np.unique(_without_slivers(whole), return_inverse=True)
@@ -105,16 +105,19 @@ def _filled(mesh: Mesh) -> Mesh:
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    count = len(mesh.vertices)
-    a, b, c = mesh.faces.T
-    rows, columns = np.concatenate([a, a]), np.concatenate([b, c])
-    links = coo_array((np.ones(len(rows)), (rows, columns)), shape=(count, count))
-    parts = connected_components(links, directed=False)[1][a]
+    count = len(mesh.faces)
+    edges = np.sort(mesh.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    edge = np.unique(edges, axis=0, return_inverse=True)[1].reshape(-1)
+    links = coo_array(
+        (np.ones(len(edge)), (np.arange(count).repeat(3), count + edge)),
+        shape=(4 * count, 4 * count),
+    )
+    parts = connected_components(links, directed=False)[1][:count]
     corners = mesh.vertices[mesh.faces] - mesh.vertices.mean(axis=0)
-    volumes = np.bincount(parts, weights=np.linalg.det(corners))
-    if (volumes > 0).all():
+    outside = np.bincount(parts, weights=np.linalg.det(corners))[parts] > 0
+    if outside.all():
         return mesh
-    used, faces = np.unique(mesh.faces[volumes[parts] > 0], return_inverse=True)
+    used, faces = np.unique(mesh.faces[outside], return_inverse=True)
     return replace(mesh, vertices=mesh.vertices[used], faces=faces.reshape(-1, 3))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from math import isfinite, nan
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from ._items import each
 from ._lots import Ground, grounds
 from ._models import Made, Wanted, wanted, write_models
 from ._options import StreamOptions
-from ._stream import side_input
+from ._stream import refuse_overwriting, refuse_single, side_input
 
 NAME = "derive"
 
@@ -31,6 +32,10 @@ NAME = "derive"
 def run_derive(grammar: str, stream: StreamOptions, values: Mapping[str, Any]) -> None:
     """Derive all buildings and write them."""
     footprint, given = values["footprint"], dict(map(_value, values["given"]))
+    outputs = (stream.output, values["tree"])
+    for output in outputs:
+        refuse_single(output, values["count"], "buildings")
+    refuse_overwriting([grammar, footprint], outputs)
     sources = (
         *(side_input(grammar) if grammar not in builtin_names() else ()),
         *(side_input(footprint) if footprint != "-" else ()),
@@ -49,9 +54,12 @@ def run_derive(grammar: str, stream: StreamOptions, values: Mapping[str, Any]) -
 def _value(text: str) -> tuple[str, float]:
     name, _, value = text.partition("=")
     try:
-        return name.strip(), float(value)
+        found = float(value)
     except ValueError:
-        raise click.UsageError(f"--set {text!r}: expected NAME=NUMBER") from None
+        found = nan
+    if not isfinite(found):
+        raise click.UsageError(f"--set {text!r}: expected NAME=NUMBER")
+    return name.strip(), found
 
 
 @dataclass(frozen=True)

@@ -20,13 +20,14 @@ from facade_tools.parallel import Outcome, map_ordered
 
 from ._options import StreamOptions
 from ._report import Progress, say_error
-from ._stream import Write, open_sink
+from ._stream import Write, open_sink, refuse_overwriting
 
 logger = logging.getLogger("facade_tools.import")
 
 
 def run_import(options: ReadOptions, stream: StreamOptions) -> None:
     """Import all inputs; raises the first error, or after --on-error skip the last."""
+    refuse_overwriting(stream.inputs, [stream.output])
     importer = Importer(options, _recorded(options), _converter(options))
     outcomes = map_ordered(
         importer, items(stream.inputs, options), jobs=stream.jobs, scheduler=stream.scheduler
@@ -90,7 +91,8 @@ class _Tally:
             return
         for identity, data in outcome.value.rows:
             if not self.seen.add(identity):
-                self._refuse(InvalidInput(f"id {identity!r} stands twice; expected unique ids"))
+                message = f"id {identity!r} stands twice; expected unique ids"
+                self._refuse(InvalidInput(message, outcome.value.place))
                 continue
             write(identity, data)
         self.kinds += outcome.value.kinds

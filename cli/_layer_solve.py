@@ -128,7 +128,7 @@ def _sweep(text: str | None, option: str) -> list[float | None]:
     if len(numbers) == 1:
         return [numbers[0]]
     start, stop, step = numbers
-    count = int((stop - start) / step + 1e-9) + 1
+    count = int(max(-2.0, min((stop - start) / step, 1e9)) + 1e-9) + 1
     if count < 1 or count > MAX_SWEEP:
         raise click.UsageError(
             f"{option}: {text!r} is {max(count, 0)} canvases; expected 1 to {MAX_SWEEP}"

@@ -9,14 +9,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import click
+
 from facade_tools.artifacts.provenance import Provenance, Source
-from facade_tools.artifacts.store import RawItem, digest, read_one, read_raw
-from facade_tools.errors import InvalidInput
+from facade_tools.artifacts.store import RawItem, digest, read_one, read_raw, read_whole
+from facade_tools.artifacts.writing import check_target, write_bytes
+from facade_tools.errors import InvalidInput, Place
 from facade_tools.parallel import map_ordered
 
 from ._options import StreamOptions
-from ._report import Progress, say_error
-from ._stream import one_by_one, open_sink, write_result
+from ._report import Progress
+from ._stream import Faults, is_folder, one_by_one, open_sink, write_result
 
 if TYPE_CHECKING:
     from facade_tools.artifacts.attributes import Attributes
@@ -36,48 +39,50 @@ def item_attributes(item: RawItem) -> Attributes:
 
 @dataclass(frozen=True)
 class Rows:
-    """The attribute vectors of all inputs, a provenance entry an input, and how many were bad."""
+    """The attribute vectors of all inputs, where each stands, and a provenance entry an input."""
 
     attributes: list[Attributes]
+    places: list[Place]
     sources: tuple[Source, ...]
-    bad: int
-
-    def complain(self) -> None:
-        """Raise InvalidInput if --on-error skip has left something out."""
-        if self.bad:
-            raise InvalidInput(f"{self.bad} bad items were skipped")
 
 
-def read_attributes(stage: str, stream: StreamOptions) -> Rows:
+def placed_attributes(item: RawItem) -> tuple[Attributes, Place]:
+    """Return the attribute vector of an item and where it stands."""
+    return item_attributes(item), Place(item.source, item.line)
+
+
+def read_attributes(stream: StreamOptions, faults: Faults) -> Rows:
     """Return the attribute vectors of mixed streams.
 
-    Raises the first error, also on ids that stand twice, unless bad items shall be skipped.
+    Bad items, and ids that stand twice, go to `faults`.
     """
-    rows: dict[str, Attributes] = {}
+    rows: dict[str, tuple[Attributes, Place]] = {}
     sources = []
-    bad = 0
     for path in stream.inputs:
         running = hashlib.sha256()
         items = _hashed(read_raw([path]), running)
-        outcomes = map_ordered(item_attributes, items, jobs=stream.jobs, scheduler=stream.scheduler)
+        outcomes = map_ordered(
+            placed_attributes, items, jobs=stream.jobs, scheduler=stream.scheduler
+        )
         with closing(outcomes):
             for outcome in outcomes:
                 error = outcome.error or _add(rows, outcome.value)
-                bad += error is not None
-                if error is not None and stream.on_error == "stop":
-                    raise error
                 if error is not None:
-                    say_error(stage, error)
+                    faults(error)
         sources.append(Source(RawItem(path, None, b"").provenance().name, running.hexdigest()))
-    return Rows(list(rows.values()), tuple(sources), bad)
+    attributes = [row for row, _ in rows.values()]
+    return Rows(attributes, [place for _, place in rows.values()], tuple(sources))
 
 
-def _add(rows: dict[str, Attributes], row: Attributes | None) -> Exception | None:
-    if row is None:
+def _add(
+    rows: dict[str, tuple[Attributes, Place]], read: tuple[Attributes, Place] | None
+) -> Exception | None:
+    if read is None:
         return None
+    row, place = read
     if row.id in rows:
-        return InvalidInput(f"id {row.id!r} stands twice; expected unique ids")
-    rows[row.id] = row
+        return InvalidInput(f"id {row.id!r} stands twice; expected unique ids", place)
+    rows[row.id] = read
     return None
 
 
@@ -87,12 +92,31 @@ def _hashed(items: Iterator[RawItem], running: Any) -> Iterator[RawItem]:
         yield item
 
 
-def load_model(path: str) -> tuple[Model, Source]:
-    """Return a model and its provenance; raises InvalidInput where it is no sound model."""
-    from facade_tools.exteriors.serialisation import network_of
+def read_tables(stream: StreamOptions) -> list[RawItem]:
+    """Return the bytes of tables: files, or standard input."""
+    return [read_whole(path) for path in stream.inputs]
+
+
+def table_source(item: RawItem) -> Source:
+    """Return name and digest of a table."""
+    return item.provenance() if item.source == "-" else digest(item.source)
+
+
+def load_model(path: str, *, tables: bool = False) -> tuple[Model, Source]:
+    """Return a model and its provenance; raises InvalidInput where it is no sound model.
+
+    tables: whether it may also be one of a table, which knows nothing of buildings.
+    """
+    from facade_tools.exteriors.declared import check_declared
+    from facade_tools.exteriors.serialisation import layout_of, network_of
 
     model = read_one(path, "model")
     try:
+        layout = layout_of(model)
+        if not layout.is_table:
+            check_declared(layout)
+        elif not tables:
+            raise InvalidInput("is a model of a table; expected one of buildings")
         network_of(model)
     except InvalidInput as error:
         raise error.at(path) from None
@@ -142,10 +166,13 @@ class Drawing:
 def write_samples(
     drawing: Drawing, count: int, output: str | None, *, jobs: int, scheduler: str | None
 ) -> None:
-    """Write `count` samples as a stream, each with its provenance."""
+    """Write `count` samples as a stream, each with its provenance; of a table's model, as CSV."""
     progress = Progress("sample")
+    head = _head(drawing, output)
     outcomes = map_ordered(drawing, drawing.runs(count), jobs=jobs, scheduler=scheduler)
     with open_sink(output) as write, closing(outcomes):
+        if head:
+            write("", head)
         for outcome in outcomes:
             if outcome.error is not None:
                 raise outcome.error
@@ -154,6 +181,19 @@ def write_samples(
                     write(identity, data)
                 progress.advance(items=lines.count)
     progress.close()
+
+
+def _head(drawing: Drawing, output: str | None) -> bytes:
+    """Return what stands before the samples: the header of a table, which must be one file."""
+    from facade_tools.exteriors.serialisation import network_of
+    from facade_tools.exteriors.table_samples import table_header
+
+    layout = network_of(drawing.model).layout
+    if not layout.is_table:
+        return b""
+    if output not in (None, "-") and Path(str(output)).suffix.lower() != ".csv":
+        raise click.UsageError(f"{output}: samples of a table are a table; expected a .csv file")
+    return table_header(layout)
 
 
 def read_given(path: str | None) -> tuple[Attributes | None, tuple[Source, ...]]:
@@ -182,17 +222,20 @@ def run_learn(
     from facade_tools.exteriors.table import learn_table
     from facade_tools.randomness import item_generator
 
+    check_outputs(stream.output, report)
     recorded = {"variant": variant, "faithful": faithful, "restarts": restarts}
     seed = stream.seed or 0
     rng = item_generator(seed, "learn")
+    faults = Faults("learn", stream.on_error)
     if groups is not None:
         options = LearnOptions(variant=variant, faithful=faithful, restarts=restarts)
-        model = learn_table(stream.inputs, groups, rng=rng, options=options)
-        sources = (*map(digest, stream.inputs), digest(groups))
+        items = read_tables(stream)
+        model = learn_table(items, groups, rng=rng, options=options, refuse=faults)
+        sources = (*map(table_source, items), digest(groups))
         rows: list[Attributes] = []
     else:
-        read = read_attributes("learn", stream)
-        more = read_attributes("learn", replace(stream, inputs=(prior,))) if prior else None
+        read = read_attributes(stream, faults)
+        more = read_attributes(replace(stream, inputs=(prior,)), faults) if prior else None
         rows, sources = read.attributes, read.sources + (more.sources if more else ())
         options = LearnOptions(
             variant, faithful, restarts, prior_rows=more.attributes if more else None
@@ -203,14 +246,22 @@ def run_learn(
         write_report(model, rows, table, report, seed)
     provenance = Provenance("learn", seed, recorded, sources)
     write_result(replace(model, provenance=provenance), stream.output)
-    if groups is None:
-        read.complain()
+    faults.complain()
+
+
+def check_outputs(output: str | None, report: str | None) -> None:
+    """Raise UsageError or OutputFailed, before anything is learned, where no output could be."""
+    files = [] if output in (None, "-") or is_folder(str(output)) else [Path(str(output))]
+    if report is not None:
+        files.append(Path(report))
+    if len({path.resolve() for path in files}) < len(files):
+        raise click.UsageError(f"{report}: expected another file for the report than for the model")
+    for path in files:
+        check_target(path)
 
 
 def compare(rows: list[Attributes], options: Any, splits: int, seed: int) -> Any:
     """Print the held-out table of all variants on standard error and return it."""
-    import click
-
     from facade_tools.exteriors.holdout import compare_variants, table_lines, training_curve
 
     table = compare_variants(rows, splits, seed=seed, options=options)
@@ -223,7 +274,6 @@ def compare(rows: list[Attributes], options: Any, splits: int, seed: int) -> Any
 
 def write_report(model: Model, rows: list[Attributes], table: Any, path: str, seed: int) -> None:
     """Write the HTML report of a model, with two buildings of each style."""
-    from facade_tools.artifacts.writing import write_bytes
     from facade_tools.exteriors.report import report_page
     from facade_tools.exteriors.style_pictures import style_pictures
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import wraps
+from math import isfinite
 from typing import Any, TypeVar
 
 import click
@@ -22,6 +23,23 @@ class StreamOptions:
     jobs: int
     scheduler: str | None
     on_error: str
+
+
+class Finite(click.types.FloatParamType):
+    """A finite number: `nan` and `inf` are numbers to Python, and to no stage."""
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """Return the number, or fail as usage does."""
+        number = super().convert(value, param, ctx)
+        if not isfinite(number):
+            self.fail(f"{value} is not a finite number.", param, ctx)
+        return number
+
+
+class FiniteRange(click.FloatRange, Finite):
+    """A finite number of a range; NaN would be in every one."""
 
 
 def inputs(metavar: str, required: bool = True) -> Callable[[F], F]:

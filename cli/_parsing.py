@@ -18,7 +18,7 @@ from facade_tools.artifacts.provenance import Provenance, Source
 from facade_tools.artifacts.writing import write_bytes
 from facade_tools.errors import FacadeError, InvalidInput
 from facade_tools.formats.png import write as write_png
-from facade_tools.grammar.reading import Method, Reading, ReadOptions
+from facade_tools.grammar.reading import Method, Reading, ReadOptions, check_mask
 from facade_tools.imaging.homography import warped
 from facade_tools.imaging.image_io import PICTURES, Photo, read_labels, read_photo
 from facade_tools.imaging.label_views import overlay
@@ -28,12 +28,20 @@ from facade_tools.randomness import item_generator
 
 from ._items import load
 from ._options import StreamOptions
-from ._rectifying import rectification_of
+from ._rectifying import check_rectification, rectification_of
 from ._report import Progress, say_error
-from ._stream import file_name, is_folder, open_sink, side_input
+from ._stream import (
+    file_name,
+    is_folder,
+    open_sink,
+    refuse_overwriting,
+    refuse_single,
+    side_input,
+)
 from .parse_image import METHODS
 
 NAME = "parse-image"
+SOLVER = "dp"
 
 
 @dataclass(frozen=True)
@@ -43,7 +51,7 @@ class ParseOptions:
     classifier: str | None
     grammar: str | None
     method: str
-    solver: str
+    solver: str | None
     mask: str | None
     labels: str | None
     raw_labels: str | None
@@ -57,7 +65,7 @@ class ParseOptions:
         """Options that can change the content."""
         metres = {"height": self.height, "storey_height": self.storey_height}
         return {
-            "method": self.method, "solver": self.solver,
+            "method": self.method, "solver": self.solver or SOLVER,
             "mask": self.mask and Path(self.mask).name,
             "grammar": self.grammar and Path(self.grammar).name,
             "classifier": self.classifier and Path(self.classifier).name,
@@ -120,8 +128,9 @@ class Read:
 
 
 def _read_options(options: ParseOptions) -> ReadOptions:
+    solver = options.solver or SOLVER
     return ReadOptions(
-        options.classifier, options.grammar, options.solver, options.height, options.storey_height
+        options.classifier, options.grammar, solver, options.height, options.storey_height
     )
 
 
@@ -143,14 +152,17 @@ def _straight(
     straight = replace(photo, pixels=turned.picture(photo.pixels))
     if mask is None:
         return straight, None
-    if mask.shape != photo.pixels.shape[:2]:
-        raise InvalidInput("the mask has another size than the picture")
+    check_mask(mask, photo.pixels.shape)
     return straight, warped(mask.astype(np.uint8), turned.homography, turned.size) > 0
 
 
 def run_parse(stream: StreamOptions, options: ParseOptions) -> None:
     """Read all pictures; write parses to the output and pictures beside."""
     _refuse_foreign(options)
+    if options.rectify is not None:
+        check_rectification(options.rectify)
+    paths = list(_paths(stream.inputs))
+    _check_outputs(paths, stream.output, options)
     method = _method(options.method, _read_options(options))  # its errors come before any picture
     del method
     sources = (
@@ -161,7 +173,6 @@ def run_parse(stream: StreamOptions, options: ParseOptions) -> None:
     )
     single = stream.output is not None and stream.output.lower().endswith(".json")
     read = Read(options, stream.seed or 0, sources, single)
-    paths = list(_paths(stream.inputs))
     outcomes = map_ordered(read, paths, jobs=stream.jobs, scheduler=stream.scheduler)
     progress = Progress(NAME)
     bad = 0
@@ -183,7 +194,7 @@ def run_parse(stream: StreamOptions, options: ParseOptions) -> None:
         raise InvalidInput(f"{bad} bad items were skipped")
 
 
-FOREIGN = {"forest": ("height", "storey_height"), "mrf": ("classifier", "grammar")}
+FOREIGN = {"forest": ("height", "storey_height"), "mrf": ("classifier", "grammar", "solver")}
 
 
 def _refuse_foreign(options: ParseOptions) -> None:
@@ -192,6 +203,39 @@ def _refuse_foreign(options: ParseOptions) -> None:
         if getattr(options, name) is not None:
             flag = name.replace("_", "-")
             raise click.UsageError(f"--{flag} means nothing to --method {options.method}")
+
+
+PICTURE_OPTIONS = ("labels", "raw_labels", "overlay")
+
+
+def _check_outputs(paths: list[str], output: str | None, options: ParseOptions) -> None:
+    """Raise UsageError or InvalidInput where a result would overwrite an input or another one."""
+    many = len(paths) > 1
+    refuse_single(output, len(paths), "pictures")
+    identities = [Path(path).stem for path in paths]
+    named = [target for name in PICTURE_OPTIONS if (target := getattr(options, name))]
+    folder = output if output not in (None, "-") and is_folder(str(output)) else None
+    if named or folder:
+        _refuse_twice(identities)
+    written = [_target(name, identity, many) for name in named for identity in identities]
+    parses = [output] if folder is None else [f"{folder}/{file_name(i)}.json" for i in identities]
+    sides = (options.classifier, options.grammar, options.mask, options.rectify)
+    refuse_overwriting([*paths, *sides], [*parses, *map(str, written)])
+
+
+def _refuse_twice(identities: list[str]) -> None:
+    seen: set[str] = set()
+    for identity in identities:
+        name = file_name(identity)
+        if name in seen:
+            raise InvalidInput(f"id {identity!r} stands twice; expected unique ids in a folder")
+        seen.add(name)
+
+
+def _target(named: str, identity: str, many: bool) -> Path:
+    """Return the file of one picture's label map or overlay."""
+    folder = many or is_folder(named)
+    return Path(named) / f"{file_name(identity)}.png" if folder else Path(named)
 
 
 def _grammar_source(options: ParseOptions) -> tuple[Source, ...]:
@@ -218,12 +262,11 @@ def _paths(inputs: tuple[str, ...]) -> Iterator[str]:
 
 def _write_pictures(result: Result, options: ParseOptions, many: bool) -> None:
     for name, data in result.pictures.items():
-        target = getattr(options, name)
-        path = Path(target)
-        if many or is_folder(target):
+        named = getattr(options, name)
+        path = _target(named, result.id, many)
+        if path != Path(named):
             try:
-                path.mkdir(parents=True, exist_ok=True)
+                path.parent.mkdir(parents=True, exist_ok=True)
             except OSError:
-                raise InvalidInput("is a file; several pictures need a folder").at(target) from None
-            path = path / f"{file_name(result.id)}.png"
+                raise InvalidInput("is a file; several pictures need a folder").at(named) from None
         write_bytes(path, data)

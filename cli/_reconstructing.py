@@ -22,7 +22,7 @@ from ._items import each
 from ._lots import Plot, plots
 from ._models import Made, Wanted, wanted, write_models
 from ._options import StreamOptions
-from ._stream import side_input
+from ._stream import refuse_overwriting, side_input
 
 NAME = "reconstruct"
 
@@ -100,6 +100,7 @@ def _known(style: str) -> str:
 def run_reconstruct(stream: StreamOptions, values: Mapping[str, Any]) -> None:
     """Reconstruct all parses and write them."""
     footprint, tree = values["footprint"], values["tree"]
+    refuse_overwriting([*stream.inputs, footprint], [stream.output, tree])
     ask = Ask(
         values["storey_height"], values["height"], values["depth"], values["roof"],
         frozenset(values["party"]),

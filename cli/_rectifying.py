@@ -18,6 +18,8 @@ from facade_tools.imaging.homography import Points
 from facade_tools.imaging.image_io import Photo, encoded, read_photo
 from facade_tools.imaging.rectify import Rectification, automatic, from_corners, from_report
 
+from ._stream import refuse_overwriting
+
 LOG = logging.getLogger("facade_tools.rectify")
 
 
@@ -26,6 +28,7 @@ def run_rectify(image: str, output: str | None, corners: str, report: str | None
     if output is None:
         raise click.UsageError("Missing option '-o': name a .png or .jpg file.")
     given = None if corners == "auto" else _corners(corners)
+    refuse_overwriting([image], [output, report])
     photo = read_photo(image)
     try:
         found = _found(photo, given)
@@ -55,11 +58,21 @@ def _found(photo: Photo, corners: Points | None) -> Rectification:
     return from_corners(photo.pixels.shape, corners)
 
 
+def check_rectification(asked: str) -> None:
+    """Raise BadParameter unless `--rectify` asks for auto, four corners or a report."""
+    if asked != "auto" and not _is_report(asked):
+        _corners(asked)
+
+
+def _is_report(asked: str) -> bool:
+    return Path(asked).suffix.lower() == ".json"
+
+
 def rectification_of(photo: Photo, asked: str) -> Rectification:
     """Return the rectification that `--rectify` asks for: auto, four corners, or a report."""
     if asked == "auto":
         return automatic(photo.pixels)
-    if Path(asked).suffix.lower() == ".json":
+    if _is_report(asked):
         return _reported(photo, asked)
     return from_corners(photo.pixels.shape, _corners(asked))
 
@@ -80,6 +93,7 @@ def _reported(photo: Photo, path: str) -> Rectification:
 
 def _corners(text: str) -> Points:
     pairs = re.findall(r"(-?\d+(?:\.\d+)?)\s*,\s*(-?\d+(?:\.\d+)?)", text)
-    if len(pairs) != 4 or re.sub(r"[-\d.,\s]", "", text):
+    corners = np.array(pairs, np.float64)
+    if len(pairs) != 4 or re.sub(r"[-\d.,\s]", "", text) or not np.isfinite(corners).all():
         raise click.BadParameter(f"{text!r} is not four pairs X,Y in pixels, or auto")
-    return np.array(pairs, np.float64)
+    return corners

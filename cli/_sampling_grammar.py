@@ -12,20 +12,22 @@ from facade_tools.artifacts.documents import encode
 from facade_tools.artifacts.numbers import dump_line
 from facade_tools.artifacts.provenance import Provenance
 from facade_tools.artifacts.writing import write_bytes
-from facade_tools.errors import InvalidInput
+from facade_tools.errors import Infeasible, InvalidInput
 from facade_tools.formats.png import write as write_png
 from facade_tools.grammar.library import load
 from facade_tools.randomness import item_generator
 from facade_tools.segmentation.painting import render_facade
 from facade_tools.segmentation.random_parse import random_parse
 
-from ._stream import open_sink, side_input
+from ._stream import open_sink, refuse_overwriting, refuse_single, side_input
 
 NAME = "sample-grammar"
 
 
 def run_sampling(grammar: str, output: str | None, seed: int, values: Mapping[str, Any]) -> None:
     """Draw the facades, and their pictures where asked for."""
+    refuse_single(output, values["count"], "facades")
+    refuse_overwriting([grammar], [output])
     rules = load(grammar)
     size = (values["width"], values["height"])
     sources = side_input(grammar) if Path(grammar).is_file() else ()
@@ -36,7 +38,10 @@ def run_sampling(grammar: str, output: str | None, seed: int, values: Mapping[st
         for number in range(values["count"]):
             identity = f"{seed}-{number}"
             rng = item_generator(seed, NAME, number)
-            tree, picture, labels = render_facade(rules, *size, rng=rng)
+            try:
+                tree, picture, labels = render_facade(rules, *size, rng=rng)
+            except Infeasible as error:
+                raise Infeasible(f"{grammar}: {error}") from None
             pixels = write_png(picture)
             digest = hashlib.sha256(pixels).hexdigest()
             parse = random_parse(tree, rules, identity, size, digest)

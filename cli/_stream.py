@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager
@@ -71,6 +72,27 @@ class ItemStage:
             raise error.at(item.source, item.line) from None
         except FacadeError as error:
             raise type(error)(f"{_place(item)}: {artifact.id}: {error}") from None
+
+
+@dataclass
+class Faults:
+    """Takes the errors of items: raises the first one, or reports each where --on-error skips."""
+
+    stage: str
+    on_error: str
+    count: int = 0
+
+    def __call__(self, error: Exception) -> None:
+        """Take one error; a bug is never skipped."""
+        if self.on_error == "stop" or not isinstance(error, FacadeError):
+            raise error
+        say_error(self.stage, error)
+        self.count += 1
+
+    def complain(self) -> None:
+        """Raise InvalidInput if anything was left out."""
+        if self.count:
+            raise InvalidInput(f"{self.count} bad items were skipped")
 
 
 def _place(item: RawItem) -> str:
@@ -203,6 +225,30 @@ def file_name(identity: str) -> str:
     """Return a file name for an item's id: what could leave the folder is replaced."""
     safe = "".join(c if c.isalnum() or c in "-_.+@" else "_" for c in identity)
     return safe.lstrip(".") or "_"
+
+
+def refuse_single(output: str | None, count: int, noun: str) -> None:
+    """Raise UsageError where one .json file is to take several artifacts."""
+    if count > 1 and _single(output):
+        raise click.UsageError(f"{output}: several {noun}; name a .jsonl file or a folder")
+
+
+def refuse_overwriting(read: Iterable[str | None], written: Iterable[str | None]) -> None:
+    """Raise UsageError where a file that is written is one that is read, or is written twice.
+
+    For stages whose results are of another kind than what they read; None and `-` are no files.
+    """
+    sources = {os.path.realpath(path) for path in read if path not in (None, "-") and path}
+    seen: set[str] = set()
+    for path in written:
+        if not path or path == "-":
+            continue
+        place = os.path.realpath(path)
+        if place in sources:
+            raise click.UsageError(f"{path}: is an input and would be overwritten; name another")
+        if place in seen:
+            raise click.UsageError(f"{path}: would be written twice; name another")
+        seen.add(place)
 
 
 def write_result(artifact: Any, output: str | None) -> None:

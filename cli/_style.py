@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
+from math import inf
 from pathlib import Path
 
 import click
@@ -157,7 +158,7 @@ def _size(text: str) -> tuple[str, tuple[float, float, float]]:
         numbers = [float(part) for part in match.groups()[1:]] if match else []
     except ValueError:
         numbers = []
-    if match is None or not numbers or min(numbers) <= 0:
+    if match is None or not numbers or not all(0 < n < inf for n in numbers):
         raise click.UsageError(f"--resize {text!r}: expected BLOCK=WIDTHxDEPTHxHEIGHT in metres")
     return match.group(1), (numbers[0], numbers[1], numbers[2])
 

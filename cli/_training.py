@@ -18,6 +18,8 @@ from facade_tools.segmentation.network_training import NetworkOptions
 from facade_tools.segmentation.patches import ForestOptions
 from facade_tools.segmentation.training import TrainOptions, load_start, read_pairs, train
 
+COARSE = 288  # rows
+
 
 def run_training(
     images: str, labels: str, output: str | None, seed: int, values: Mapping[str, Any]
@@ -25,10 +27,13 @@ def run_training(
     """Read the pairs, train, write the npz."""
     if output is None:
         raise click.UsageError("Missing option '-o': name a .npz file.")
+    coarse, height = values["coarse"], values["height"]
+    if coarse is not None and coarse > height:
+        raise click.UsageError(f"--coarse {coarse} is above --height {height}")
     start = None if values["start"] is None else load_start(values["start"])
     options = TrainOptions(
-        features=values["features"], stages=values["stages"], height=values["height"],
-        coarse=min(values["coarse"], values["height"]),
+        features=values["features"], stages=values["stages"], height=height,
+        coarse=min(COARSE, height) if coarse is None else coarse,
         pixels=values["pixels"], augment=values["augment"], balance=values["balance"],
         boost=BoostOptions(rounds=values["rounds"]),
         forest=ForestOptions(values["trees"], values["depth"], values["patch"]),

@@ -1,4 +1,4 @@
-"""The body of `facade validate`: schema first, then the geometry rules of the kind."""
+"""The body of `facade validate`: schema first, then the rules of the kind."""
 
 from __future__ import annotations
 
@@ -17,8 +17,9 @@ from ._options import StreamOptions
 from ._report import Progress
 from ._stream import open_sink
 
-# Kind of artifact -> function that yields the problems of its geometry.
+# Kind of artifact -> function that yields its problems.
 RULES = {
+    "attributes": "facade_tools.exteriors.relations:contradictions",
     "blocks": "facade_tools.stylization.bases:blocks_problems",
     "building": "facade_tools.geometry.checks:building_problems",
     "derivation": "facade_tools.reconstruction.records:derivation_problems",

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import click
 
-from ._options import F, StreamOptions, stream_options
+from ._options import F, FiniteRange, StreamOptions, stream_options
 
 
 def _side(name: str) -> Callable[[F], F]:
@@ -28,7 +28,7 @@ def _side(name: str) -> Callable[[F], F]:
 @click.option("--metres", is_flag=True, help="The GeoJSON's coordinates are planar metres.")
 @click.option("--roof", metavar="STYLE[:PITCH[:x|y]]",
               help="Roof as seen from above; pitch in degrees, ridge along x or y.")  # fmt: skip
-@click.option("--storey-height", type=click.FloatRange(2, 10), metavar="M",
+@click.option("--storey-height", type=FiniteRange(2, 10), metavar="M",
               help="Height of a storey, metres.  [default: the parses' scale, or 3]")  # fmt: skip
 @click.option("--windows", type=click.Choice(["unknown", "sash", "sliding", "casement", "fixed"]),
               default="unknown", show_default=True, help="Style of the windows.")  # fmt: skip

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from math import isfinite, nan
+
 import click
 
-from ._options import output
+from ._options import FiniteRange, output
 
 
 def _count(_: click.Context, parameter: click.Parameter, value: str) -> int | None:
@@ -17,9 +19,12 @@ def _count(_: click.Context, parameter: click.Parameter, value: str) -> int | No
 
 def _azimuth(_: click.Context, parameter: click.Parameter, value: str) -> float | None:
     try:
-        return None if value == "auto" else float(value)
+        degrees = None if value == "auto" else float(value)
     except ValueError:
-        raise click.BadParameter("expected degrees, or auto", param=parameter) from None
+        degrees = nan
+    if degrees is not None and not isfinite(degrees):
+        raise click.BadParameter("expected degrees, or auto", param=parameter)
+    return degrees
 
 
 @click.command()
@@ -41,12 +46,12 @@ def _azimuth(_: click.Context, parameter: click.Parameter, value: str) -> float 
 )
 @click.option(
     "--window-size",
-    type=click.FloatRange(0, min_open=True),
+    type=FiniteRange(0, min_open=True),
     help="Objective window size, metres: shorter sections are merged. Default: the median found.",
 )
 @click.option(
     "--thickness",
-    type=click.FloatRange(0),
+    type=FiniteRange(0),
     help="Depth of walls from their outer to their inner boundary, metres: how much of them an "
     "overhang may thin. Default: the depth of their relief.",
 )

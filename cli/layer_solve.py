@@ -23,7 +23,7 @@ from . import _options
 )
 @click.option(
     "--time-limit",
-    type=click.FloatRange(0.1, 86400),
+    type=_options.FiniteRange(0.1, 86400),
     default=10.0,
     show_default=True,
     help="Seconds for a layout; then the best so far, optimal: false.",

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import click
 
-from ._options import StreamOptions, stream_options
+from facade_tools.errors import InvalidInput
+
+from ._options import FiniteRange, StreamOptions, stream_options
 from ._stream import ItemStage, run_stream, side_input
 
 
@@ -26,7 +31,7 @@ from ._stream import ItemStage, run_stream, side_input
 )
 @click.option(
     "--require",
-    type=click.FloatRange(0),
+    type=FiniteRange(0),
     metavar="E",
     help="Exit 4 where the mass energy stays above E; default: only report it.",
 )
@@ -45,12 +50,11 @@ def command(
     \b
     Example: facade sample model.json -n 5 | facade massgen - -o masses.jsonl
     """
-    from facade_tools.artifacts.store import read_one
     from facade_tools.exteriors.massgen import generate_mass
 
     from ._learning import load_model
 
-    known = None if keep is None else read_one(keep, "building")
+    known = None if keep is None else _known(keep)
     model = None if model_path is None else load_model(model_path)[0]
     recorded = {"candidates": candidates, "require": require}
     options = {"keep": known, "candidates": candidates, "require": require, "model": model}
@@ -63,3 +67,15 @@ def command(
         side_input(keep) + side_input(model_path),
     )
     run_stream(stage, stream)
+
+
+def _known(path: str) -> Any:
+    """Return a partial building; raises InvalidInput where its boxes break a rule of geometry."""
+    from facade_tools.artifacts.store import read_one
+    from facade_tools.geometry.checks import building_problems
+
+    known = read_one(path, "building")
+    for problem in building_problems(replace(known, facades={})):
+        if problem.pointer.startswith("/boxes/"):
+            raise InvalidInput(problem.message, pointer=problem.pointer).at(path)
+    return known

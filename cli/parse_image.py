@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from ._options import StreamOptions, stream_options
+from ._options import FiniteRange, StreamOptions, stream_options
 
 # Method -> function(ReadOptions) that returns a Method (facade_tools.grammar.reading); it loads
 # when it is called for.
@@ -30,15 +30,16 @@ METHODS = {
     "window stripes, nothing learned (KSTTP09).",
 )  # fmt: skip
 @click.option(
-    "--solver", type=click.Choice(["dp", "walk"]), default="dp", show_default=True,
-    help="dp: exact in turn over rows and columns; walk: the paper's random walk.",
+    "--solver", type=click.Choice(["dp", "walk"]),
+    help="forest: dp, exact in turn over rows and columns; walk, the paper's random walk.  "
+    "[default: dp]",
 )  # fmt: skip
 @click.option(
-    "--height", type=click.FloatRange(1, 1000), metavar="M",
+    "--height", type=FiniteRange(1, 1000), metavar="M",
     help="mrf: height of the building to the top of its roof, metres.  [default: unknown]",
 )  # fmt: skip
 @click.option(
-    "--storey-height", type=click.FloatRange(1, 20), metavar="M",
+    "--storey-height", type=FiniteRange(1, 20), metavar="M",
     help="mrf: height of a storey, metres.  [default: unknown; taken to be 3]",
 )  # fmt: skip
 @click.option(

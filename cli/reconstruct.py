@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from ._options import StreamOptions, stream_options
+from ._options import FiniteRange, StreamOptions, stream_options
 
 SIDES = click.Choice(["front", "back", "left", "right"])
 
@@ -21,13 +21,13 @@ SIDES = click.Choice(["front", "back", "left", "right"])
     "--image", metavar="PATH",
     help="The picture, or a folder of pictures.  [default: beside the parse]",
 )  # fmt: skip
-@click.option("--height", type=click.FloatRange(2.0, 500.0), metavar="M",
+@click.option("--height", type=FiniteRange(2.0, 500.0), metavar="M",
               help="Metres from the ground to the top of the roof in the picture.")  # fmt: skip
 @click.option(
-    "--storey-height", type=click.FloatRange(1.5, 20.0), metavar="M",
+    "--storey-height", type=FiniteRange(1.5, 20.0), metavar="M",
     help="Metres from floor to floor.  [default: what the parse says, else 3]",
 )  # fmt: skip
-@click.option("--depth", type=click.FloatRange(1.0, 500.0), default=12.0, show_default=True,
+@click.option("--depth", type=FiniteRange(1.0, 500.0), default=12.0, show_default=True,
               help="Metres behind the facade, of the default footprint.")  # fmt: skip
 @click.option("--roof", type=click.Choice(["auto", "flat", "gable", "hip", "mansard"]),
               default="auto", show_default=True,

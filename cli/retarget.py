@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from ._options import StreamOptions, on_error, output, seed
+from ._options import FiniteRange, StreamOptions, on_error, output, seed
 
 
 @click.command()
@@ -26,7 +26,7 @@ from ._options import StreamOptions, on_error, output, seed
 )
 @click.option(
     "--reassign",
-    type=click.FloatRange(0, 1),
+    type=FiniteRange(0, 1),
     default=0.05,
     show_default=True,
     help="Share of a side's area below which a group of faces, on blocks that stand together "

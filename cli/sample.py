@@ -16,7 +16,7 @@ from . import _options
 @click.option(
     "--min-distance",
     metavar="D",
-    type=click.FloatRange(0),
+    type=_options.FiniteRange(0),
     default=0.0,
     show_default=True,
     help="Root mean square distance, in standard deviations a coordinate, that samples keep from "
@@ -44,6 +44,8 @@ def command(
 ) -> None:
     """Draw attribute vectors of new buildings from a model (FW16 5, 7), or complete a partial one.
 
+    A model of a table (learn --groups) gives rows of that table, as CSV.
+
     \b
     Example:
       facade sample model.json -n 20 --seed 7 -o attributes.jsonl
@@ -53,7 +55,7 @@ def command(
 
     from ._learning import Drawing, load_model, read_given, write_samples
 
-    loaded, source = load_model(model)
+    loaded, source = load_model(model, tables=given is None)
     known, sources = read_given(given)
     recorded = {"style": style, "top": top, "min_distance": min_distance, "smooth": smooth}
     provenance = Provenance("sample", seed, recorded, (source, *sources))

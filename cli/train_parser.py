@@ -28,11 +28,12 @@ from . import _options
               help="Pixels sampled a picture, variant and stage.")  # fmt: skip
 @click.option("--height", type=click.IntRange(32, 2000), default=576, show_default=True,
               help="Working resolution: rows of a picture, pixels.")  # fmt: skip
-@click.option("--coarse", type=click.IntRange(32, 2000), default=288, show_default=True,
-              help="Rows that all stages but the last two see; at most --height.")  # fmt: skip
+@click.option("--coarse", type=click.IntRange(32, 2000),
+              help="Rows that all stages but the last two see.  "
+              "[default: 288; at most --height]")  # fmt: skip
 @click.option("--augment", type=click.IntRange(0, 20), default=1, show_default=True,
               help="Varied copies a picture: mirror, light, blur, perspective.")  # fmt: skip
-@click.option("--balance", type=click.FloatRange(0, 1), default=0.0, show_default=True,
+@click.option("--balance", type=_options.FiniteRange(0, 1), default=0.0, show_default=True,
               help="0 weighs pixels equally, 1 classes.")  # fmt: skip
 @click.option("--steps", type=click.IntRange(0, 10**6), default=7000, show_default=True,
               help="Views that train the network beside the trees; 0: trees alone.")  # fmt: skip

@@ -6,7 +6,7 @@ import re
 
 import click
 
-from ._options import StreamOptions, stream_options
+from ._options import Finite, FiniteRange, StreamOptions, stream_options
 
 # Kind of artifact -> function(artifact) that returns a Scene or an RGB picture (h, w, 3) uint8.
 # One line a kind; the function's module loads when an artifact of the kind is drawn.
@@ -43,11 +43,11 @@ def _size(ctx: click.Context, param: click.Parameter, value: str | None) -> tupl
 @click.command()
 @stream_options("ARTIFACT...", seeded=False)
 @click.option(
-    "--azimuth", type=float, default=-30.0, show_default=True,
+    "--azimuth", type=Finite(), default=-30.0, show_default=True,
     help="Where the viewer stands, degrees: 0 in front, 90 at the right side.",
 )  # fmt: skip
 @click.option(
-    "--elevation", type=click.FloatRange(-10, 89), default=6.0, show_default=True,
+    "--elevation", type=FiniteRange(-10, 89), default=6.0, show_default=True,
     help="How high the viewer stands, degrees above the horizon.",
 )  # fmt: skip
 @click.option(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -63,6 +64,38 @@ def test_plain_house_is_sound() -> None:
 def test_mass_without_facades_is_sound() -> None:
     assert problems(replace(house(), facades={})) == []
 
+
+def _beside(lower: Box, higher: Box) -> Building:
+    return Building("m", (lower, higher))
+
+
+# a mass -> the side and the origin of a wall in whose middle a lower roof stands
+RISING: dict[str, tuple[Building, Side, tuple[float, float, float]]] = {
+    "hip that runs on into the wall": (
+        _beside(
+            Box("wing", "general", 6, 9.5, 12, 3, 3, Roof("hip", 30, "x", 0.5)),
+            Box("main", "general", 6, 4, 12, 8, 6, Roof("hip", 30, "x", 0.5)),
+        ),
+        "back",
+        (12.0, 8.0, 3.0),
+    ),
+    "gable around a tall box, eaves far below": (
+        _beside(
+            Box("main", "general", 6, 5, 12, 10, 4.9, Roof("gable", 40, "x", 0.3)),
+            Box("tall", "general", 6, 4, 4, 4, 9, Roof("flat")),
+        ),
+        "back",
+        (8.0, 6.0, 6.0),
+    ),
+    "shed around a tall box": (
+        _beside(
+            Box("main", "general", 7, 5, 14, 10, 5, Roof("shed", 30, "x", 0.5)),
+            Box("tall", "general", 8, 6, 3, 3, 11, Roof("flat")),
+        ),
+        "right",
+        (9.5, 4.5, 9.0),
+    ),
+}
 
 FAULTS: dict[str, tuple[Callable[[Building], Building], str, str]] = {
     "no general box": (
@@ -154,6 +187,26 @@ def test_window_in_front_of_a_lower_roof_is_found() -> None:
     )
     broken = replace(sound, facades={**sound.facades, "right": Facade(pieces)})
     assert [p.message for p in problems(broken) if "roof" in p.message]
+
+
+@pytest.mark.parametrize("name", RISING)
+def test_window_where_a_lower_roof_runs_into_the_wall_is_found(name: str) -> None:
+    mass, side, origin = RISING[name]
+    facades: dict[Side, Facade] = {s: Facade(p) for s, p in facade_pieces(mass).items()}
+    wall = next(p for p in facades[side].pieces if p.origin == origin)
+    sunk = Element("window", "sash", wall.width / 2 - 0.5, 0.9, 1.0, 1.4)
+    pieces = tuple(replace(p, elements=(sunk,)) if p is wall else p for p in facades[side].pieces)
+    found = problems(replace(mass, facades={**facades, side: Facade(pieces)}))
+    assert [p.message for p in found if "roof" in p.message]
+
+
+def test_no_roof_stands_before_a_wall_beside_the_lower_box() -> None:
+    mass, side, _ = RISING["hip that runs on into the wall"]
+    free = [p for p in facade_pieces(mass)["left"] if p.box == "main" and p.origin[2] == 3.0]
+    assert blocked_rectangles(mass, "left", free[0])[:, 3].max() < 0.06  # the eaves' overhang
+    buried = next(p for p in facade_pieces(mass)[side] if p.origin[2] == 3.0)
+    ridge = blocked_rectangles(mass, side, buried)[:, 3].max()
+    assert ridge == pytest.approx(3.0 * math.tan(math.radians(30)) + 0.2, abs=0.02)
 
 
 def test_window_behind_a_post_is_found_and_a_known_one_is_let_be() -> None:

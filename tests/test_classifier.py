@@ -333,6 +333,10 @@ def test_train_parser_end_to_end(facade, pairs, tmp_path):
     assert isinstance(decoded(out.read_bytes()), Classifier)
     missing = facade("train-parser", tmp_path, tmp_path / "labels", "-o", out)
     assert missing.returncode == 3
+    folders = (tmp_path / "images", tmp_path / "labels")
+    high = facade("train-parser", *folders, "--height", 96, "--coarse", 97, "-o", out)
+    assert high.returncode == 2
+    assert b"--coarse 97 is above --height 96" in high.stderr
     start = ("--start", out)
     bare = facade("train-parser", tmp_path / "images", tmp_path / "labels", *start, "-o", out)
     assert bare.returncode == 3

@@ -112,6 +112,38 @@ def test_exit_codes(facade, tmp_path, words, code):
         assert done.stderr.count(b"\n") == 1
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["sample", "m.json", "--min-distance"],
+        ["massgen", "a.jsonl", "--require"],
+        ["view", "b.json", "-o", "x.png", "--azimuth"],
+        ["view", "b.json", "-o", "x.png", "--elevation"],
+        ["layer-solve", "d.yaml", "--time-limit"],
+        ["layer-solve", "d.yaml", "--width"],
+        ["capture-style", "m.obj", "-o", "s", "--front"],
+        ["capture-style", "m.obj", "-o", "s", "--window-size"],
+        ["reconstruct", "p.json", "-o", "b.json", "--depth"],
+        ["assemble", "p.json", "-o", "b.json", "--storey-height"],
+        ["parse-image", "p.png", "--height"],
+        ["train-parser", "i", "l", "-o", "c.npz", "--balance"],
+        ["derive", "grammar", "-o", "b.json", "--set", "floors={}"],
+    ],
+    ids=lambda words: " ".join(w for w in words if w.startswith("--") or words[0] == w),
+)
+@pytest.mark.parametrize("number", ["nan", "inf", "-inf"])
+def test_a_number_that_is_none_is_usage(facade_here, tmp_path, words, number):
+    last = [words[-1].format(number)] if "{}" in words[-1] else [words[-1], number]
+    done = facade_here(*words[:-1], *last, cwd=tmp_path)
+    assert done.returncode == 2, done.stderr
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("sweep", ["1:1000:1e-320", "1000:1:1e-320"])
+def test_a_sweep_of_endless_canvases_is_usage(facade_here, sweep):
+    assert facade_here("layer-solve", "d.yaml", "--width", sweep).returncode == 2
+
+
 def test_a_bad_item_stops_the_stream_and_leaves_no_file(facade, spoiled, tmp_path):
     out = tmp_path / "out.jsonl"
     done = facade("attributes", spoiled, "-o", out)
@@ -143,6 +175,28 @@ def test_one_json_file_holds_one_artifact(facade, tmp_path):
     first = BUNGALOWS.read_bytes().splitlines()[0]
     assert facade("attributes", "-", "-o", tmp_path / "x.json", stdin=first).returncode == 0
     assert (tmp_path / "x.json").read_bytes().count(b"\n") > 10
+
+
+@pytest.mark.parametrize(("stage", "name"), [
+    ("export", "a.city.json"), ("import", "a.city.json"), ("import", "./b/../a.city.json"),
+    ("reconstruct", "a.json"),
+])  # fmt: skip
+def test_results_of_another_kind_do_not_overwrite_their_input(facade_here, tmp_path, stage, name):
+    (tmp_path / "b").mkdir()
+    path = tmp_path / name
+    path.write_text("{}")
+    done = facade_here(stage, path.resolve(), "-o", name, cwd=tmp_path)
+    assert done.returncode == 2, done.stderr
+    assert b"is an input and would be overwritten" in done.stderr
+    assert path.read_text() == "{}"
+
+
+def test_a_stage_from_json_to_json_may_replace_its_input(facade_here, tmp_path):
+    path = tmp_path / "house.jsonl"
+    path.write_bytes(BUNGALOWS.read_bytes())
+    assert facade_here("attributes", path, "-o", path).returncode == 0
+    assert facade_here("validate", path).returncode == 0
+    assert json.loads(path.read_bytes().splitlines()[0])["schema"] == "facade-tools/attributes/1"
 
 
 def test_ids_cannot_leave_the_folder(facade, tmp_path):

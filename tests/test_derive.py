@@ -383,6 +383,20 @@ BAD = [
     ("extrude: 3,", "extrude: 3, scale: {x: -1},", "size of -1 m", 6),
     ("split: x,", "split: x, repeat: x, each: 2,", "at once", 8),
     ("axiom: Lot", "axiom: Wall", "has no rule", 3),
+    ("extrude: 3,", "extrude: .nan,", "nan is no finite number", 6),
+    ("extrude: 3,", "extrude: 1e7,", "has a size of 1e+07 m", 6),
+    ("extrude: 3,", "translate: {x: 1e15}, extrude: 3,", "lies 1e+15 m away", 6),
+    ("{width: 8,", "{width: 1e9,", "expected at most 1e+06 m", 4),
+    ("extrude: 3,", "extrude: 1e5,", "more than 1000 storeys of 3 m", 2),
+    ("{label: window}", "{label: window, style: pig}", "'pig' is no style of a window", 9),
+    (
+        "faces: {front: Front, side: Wall, top: Wall}", "roof: gable, pitch: 89, into: {all: Wall}",
+        "89 is no pitch from 0 to 88°", 7,
+    ),
+    (
+        "faces: {front: Front, side: Wall, top: Wall}",
+        "roof: mansard, rise: [2, -1], into: {all: Wall}", "-1 is no rise of at least 0 m", 7,
+    ),
 ]  # fmt: skip
 
 
@@ -397,6 +411,18 @@ def test_refusals_name_the_rules_line(facade_here, tmp_path, old, new, message, 
     assert message in text
     assert f"bad.yaml:{line}: /" in text, text
     assert not (tmp_path / "x.json").exists()
+
+
+def test_towers_of_too_many_pieces_are_refused_before_they_are_made():
+    towers = BOX.replace(
+        "{symbol: Lot, do: [{extrude: 3, into: Body}]}",
+        "{symbol: Lot, do: [{repeat: x, each: 0.8, into: Strip}]}\n"
+        "  - {symbol: Strip, do: [{extrude: 2000 + index, into: Wall}]}",
+    ).replace("width: 8", "width: 80")
+    made = derived(towers)
+    with pytest.raises(InvalidInput, match=r"100 boxes have some .* pieces of wall") as error:
+        derived_building(made, "x", 3.0)
+    assert error.value.place.pointer == "/storey_height"
 
 
 def test_lines_of_pointers():

@@ -74,3 +74,16 @@ def test_bad_footprints_are_skipped_and_jobs_change_nothing(facade_here, tmp_pat
     ids = [json.loads(line)["id"] for line in one.stdout.splitlines()]
     assert ids == ["one-0", "one-1", "two-0", "two-1"]
     assert b"skipped" in one.stderr
+
+
+def test_several_buildings_do_not_go_into_one_json_file(facade_here, tmp_path):
+    for words in (("-o", "x.json"), ("-o", "x.glb", "--tree", "x.json")):
+        done = facade_here("derive", "haussmann", "-n", 2, *words, cwd=tmp_path)
+        assert done.returncode == 2
+        assert b"x.json: several buildings" in done.stderr
+    assert not list(tmp_path.iterdir())
+    name = tmp_path / "lot.json"
+    name.write_text("{}")
+    done = facade_here("derive", "haussmann", "--footprint", name, "-o", name)
+    assert done.returncode == 2
+    assert b"is an input and would be overwritten" in done.stderr

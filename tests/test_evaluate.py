@@ -115,6 +115,107 @@ def test_bad_input_is_one_line_and_exit_3(facade_script, folder, model):
         assert done.stderr.decode().startswith(f"facade {words[0]}: error:")
 
 
+def test_skip_goes_on_after_rows_without_observations(facade_script, folder, model, attributes):
+    head = {"schema": "facade-tools/attributes/1"}
+    bad = [{"id": "e"}, {"id": "f", "mass": {"bdry": 4.2}}, {"id": "g", "mass": {"far": 0.5}}]
+    good = attributes.read_bytes().splitlines(keepends=True)[:3]
+    rows = [json.dumps({**head, **row}).encode() + b"\n" for row in (*bad, {"id": "e"})]
+    (folder / "some.jsonl").write_bytes(b"".join([*good, *rows]))
+    done = run(
+        facade_script, "evaluate", model, folder / "some.jsonl", "--on-error", "skip", code=3
+    )
+    found = json.loads(done.stdout)
+    assert found["n"] == len(found["per_building"]) == 3
+    alone = "alone no coordinate of the model follows"
+    for line, reason in (
+        (4, "e: nothing is observed"),
+        (5, f"f: of mass.bdry {alone}"),
+        (6, f"g: of mass.far {alone}"),
+        (7, "id 'e' stands twice"),
+    ):
+        assert f"some.jsonl:{line}: {reason}" in done.stderr.decode()
+    stopped = run(facade_script, "evaluate", model, folder / "some.jsonl", code=3)
+    assert stopped.stdout == b""
+    assert stopped.stderr.decode().count("\n") == 1
+
+
+def _swap(document):
+    first, second = document["groups"][2:4]
+    document["groups"][2:4] = second, first
+
+
+@pytest.mark.parametrize(
+    ("change", "pointer"),
+    [
+        (lambda d: d["groups"].append(d["groups"][0]), "/groups/10"),
+        (lambda d: d["groups"].pop(), "/groups"),
+        (lambda d: d["groups"][0].update(name="nobody"), "/groups/0/name"),
+        (
+            lambda d: d["groups"][0]["coordinates"][0].update(name="w"),
+            "/groups/0/coordinates/0/name",
+        ),
+        (lambda d: d["groups"][5]["coordinates"][0].pop("part"), "/groups/5/coordinates/0/part"),
+        (_swap, "/groups/2/name"),
+        (lambda d: d["elements"].pop(0), "/elements/0/name"),
+        (lambda d: d["elements"][0]["bits"].__setitem__(0, "tent"), "/elements/0/bits/0"),
+        (lambda d: d.update(boundary="bdry"), "/groups/2/coordinates/0/name"),
+        (lambda d: d["training"]["values"][3].pop(), "/training/values/3"),
+    ],
+)
+@pytest.mark.parametrize("stage", ["sample", "evaluate"])
+def test_a_model_of_other_names_is_refused(
+    facade_here, tmp_path, model, attributes, stage, change, pointer
+):
+    document = json.loads(model.read_text())
+    change(document)
+    path = tmp_path / "tampered.json"
+    path.write_text(json.dumps(document))
+    done = facade_here(stage, path, *([attributes] if stage == "evaluate" else []))
+    assert (done.returncode, done.stdout) == (3, b"")
+    start = f"facade {stage}: error: {path}: {pointer}: "
+    assert done.stderr.decode().startswith(start)
+    assert done.stderr.count(b"\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "message"),
+    [
+        (["--report", "x.json", "-o", "./x.json"], 2, "another file for the report"),
+        (["--report", "no/folder/x.html", "-o", "x.json"], 1, "no/folder/x.html: cannot be"),
+        (["-o", "no/folder/x.json"], 1, "no/folder/x.json: cannot be"),
+    ],
+)
+def test_outputs_that_cannot_be_are_refused_before_learning(
+    facade_here, monkeypatch, tmp_path, attributes, words, code, message
+):
+    import facade_tools.exteriors.learning as learning
+
+    monkeypatch.setattr(learning, "learn_model", lambda *_, **__: pytest.fail("learned"))
+    done = facade_here("learn", attributes, *words, cwd=tmp_path)
+    assert done.returncode == code
+    assert message in done.stderr.decode()
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("stage", ["learn", "evaluate"])
+def test_an_id_that_stands_twice_is_refused_by_its_line(facade_here, model, attributes, stage):
+    words = (stage, model) if stage == "evaluate" else (stage,)
+    done = facade_here(*words, attributes, "-", stdin=attributes.read_bytes().splitlines()[3])
+    assert done.returncode == 3
+    assert done.stderr.decode().startswith(f"facade {stage}: error: -:1: id ")
+
+
+@pytest.mark.parametrize("number", [".nan", ".inf", "-.inf"])
+def test_a_number_that_is_none_is_refused_by_its_pointer(facade_here, tmp_path, model, number):
+    partial = tmp_path / "partial.yaml"
+    partial.write_text(
+        f"schema: facade-tools/attributes/1\nid: mine\nmass: {{bbox: [12.5, {number}, null]}}\n"
+    )
+    done = facade_here("sample", model, "--given", partial)
+    assert done.returncode == 3
+    assert f"{partial}: /mass/bbox/1: " in done.stderr.decode()
+
+
 def test_nothing_observed_is_invalid(facade_script, folder, model):
     (folder / "empty.json").write_text('{"schema": "facade-tools/attributes/1", "id": "e"}')
     run(facade_script, "evaluate", model, folder / "empty.json", code=3)

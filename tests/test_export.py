@@ -118,6 +118,34 @@ def test_imported_items_go_back_to_their_map(facade_here, tmp_path):
     assert geometry["b/mass"].bounds[0] == pytest.approx([24.0, 0.0, -9.0])
 
 
+@pytest.mark.parametrize("arrange", ["auto", "own"])
+def test_national_coordinates_without_a_frame_are_not_rounded_away(facade_here, tmp_path, arrange):
+    ring = [[4500000.25 + x, 5600000.5 + y] for x, y in ((0, 0), (8, 0), (8, 6), (0, 6))]
+    next_to_it = [[x + 20.125, y] for x, y in ring]
+    items = [
+        {**FOOTPRINT, "id": name, "polygon": [r]} for name, r in (("a", ring), ("b", next_to_it))
+    ]
+    done = facade_here(
+        "export", "-", "--arrange", arrange, "-o", tmp_path / "x.glb", stdin=stream(*items)
+    )
+    assert done.returncode == 0, done.stderr
+    assert (
+        b"a: too far from 0 for 32-bit floats; the model's origin is 4500000, 5600000, 0"
+        in done.stderr
+    )
+    scene = trimesh.load(tmp_path / "x.glb")
+    masses = [scene.geometry[f"{name}/mass"].bounds for name in "ab"]
+    assert masses[0][0][[0, 2]] == pytest.approx([0.25, -6.5], abs=1e-5)
+    assert masses[1][0][0] == pytest.approx(20.375, abs=1e-5)
+
+
+def test_models_too_far_apart_for_one_file_are_warned_of(facade_here, tmp_path):
+    far = {**FOOTPRINT, "id": "far", "polygon": [[[5e5, 0], [500009, 0], [500009, 6], [5e5, 6]]]}
+    done = facade_here("export", "-", "-o", tmp_path / "x.glb", stdin=stream(FOOTPRINT, far))
+    assert done.returncode == 0
+    assert b"over 10 km apart" in done.stderr
+
+
 def test_a_single_model_stays_local_but_its_cityjson_knows_the_map(facade_here, tmp_path):
     for end in ("glb", "city.json"):
         done = facade_here(

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from facade_tools.artifacts.attributes import FacadeAttributes
-from facade_tools.artifacts.building import SIDES, Box, Building, Colors, Roof
+from facade_tools.artifacts.building import SIDES, Box, Building, Colors, Element, Facade, Roof
 from facade_tools.artifacts.documents import encode
 from facade_tools.artifacts.numbers import dump_line
 from facade_tools.artifacts.store import read
@@ -25,8 +25,10 @@ from facade_tools.exteriors.facadegen import FacadeOptions, generate_facades
 from facade_tools.exteriors.genetic import Search
 from facade_tools.exteriors.library import build_library, default_library, kmeans
 from facade_tools.exteriors.palette import house_colors
+from facade_tools.geometry.blocked import wall_of
 from facade_tools.geometry.checks import building_problems
 from facade_tools.geometry.pieces import facade_pieces
+from facade_tools.geometry.solids import building_solid, triangulated
 
 ROOT = Path(__file__).parent.parent
 HOUSES = ROOT / "sample_data" / "houses"
@@ -225,6 +227,114 @@ def test_known_element_without_a_wall_is_infeasible():
     keep = replace(whole, partial=True)
     with pytest.raises(Infeasible, match="known"):
         made(replace(bare(whole), boxes=(far, *whole.boxes[1:])), keep=keep)
+
+
+def _moved(building: Building, by: float) -> Building:
+    """A partial building of the front alone, all of its elements known and moved along."""
+    pieces = tuple(
+        replace(p, elements=tuple(replace(e, u=e.u + by, known=True) for e in p.elements))
+        for p in building.facades["front"].pieces
+    )
+    return replace(building, facades={"front": Facade(pieces)}, partial=True)
+
+
+def test_known_elements_that_overlap_are_infeasible():
+    mass = bare(sample("two_storey_gable", 1))
+    seen = _moved(sample("two_storey_gable", 1), 0.0)
+    shifted = _moved(sample("two_storey_gable", 1), 0.03)
+    with pytest.raises(Infeasible, match="overlap"):
+        made(replace(mass, facades=seen.facades), keep=shifted)
+
+
+def test_two_known_main_doors_are_infeasible():
+    whole = sample("two_storey_gable", 1)
+    left, *others = whole.facades["left"].pieces
+    door = Element("door", "panel", 1.0, 0.0, 0.9, 2.1, main=True)
+    doubled = replace(left, elements=(door,))
+    sides = {"front": whole.facades["front"], "left": Facade((doubled, *others))}
+    with pytest.raises(Infeasible, match="both main doors"):
+        made(bare(whole), keep=replace(whole, facades=sides, partial=True))
+
+
+def test_element_known_twice_to_the_millimetre_is_one():
+    mass = bare(sample("two_storey_gable", 1))
+    seen, again = (_moved(sample("two_storey_gable", 1), by) for by in (0.0, 5e-4))
+    (house,) = made(replace(mass, facades=seen.facades), keep=again)
+    assert [e for side, _, e in elements(house) if side == "front"] == [
+        e for _, _, e in elements(again)
+    ]
+
+
+# --- roofs before walls -------------------------------------------------------------------------
+
+
+def sunk(building: Building) -> list[str]:
+    """Elements of which a point 3 cm before the wall lies inside the solid."""
+    vertices, triangles, _ = triangulated(building_solid(building))
+    corners = vertices[triangles]
+    found = []
+    for side, piece, e in elements(building):
+        wall = wall_of(side, piece)
+        start = np.array(wall.start) + 0.03 * np.array(wall.outwards)
+        for across, up in product((0.02, 0.25, 0.5, 0.75, 0.98), repeat=2):
+            at = start + (e.u + across * e.width) * np.array(wall.along) + (1e-5, 2e-5)
+            if _inside(corners, (*at, piece.origin[2] + e.v + up * e.height)):
+                found.append(f"{piece.id} {e.kind}")
+                break
+    return found
+
+
+def _inside(corners, point) -> bool:
+    """Whether an odd number of triangles (n, 3, 3) lie above a point."""
+    edges = np.roll(corners, -1, axis=1) - corners
+    offset = np.array(point) - corners
+    turns = edges[..., 0] * offset[..., 1] - edges[..., 1] * offset[..., 0]
+    over = corners[(turns > 0).all(axis=1) | (turns < 0).all(axis=1)]
+    normal = np.cross(over[:, 1] - over[:, 0], over[:, 2] - over[:, 0])
+    height = (normal * (over[:, 0] - np.array(point))).sum(axis=1) / normal[:, 2]
+    return bool((height > 0).sum() % 2)
+
+
+def _two(*boxes: Box) -> Building:
+    targets = replace(building_attributes(sample("two_storey_gable")), id="m")
+    return Building("m", boxes, targets=targets)
+
+
+def _roofs_before_walls() -> dict[str, Building]:
+    hip, gable, shed = (Roof(style, 35, "x", 0.4) for style in ("hip", "gable", "shed"))
+    lean = {"depth": 2.82, "height": 3.0}
+    return {
+        "hip behind": _two(
+            Box("main", "general", 6.25, 3.79, 12.5, 7.58, 5.9, hip),
+            Box("wing", "general", 6.25, 8.99, 12.5, **lean, roof=hip),
+        ),
+        "gable behind": _two(
+            Box("main", "general", 6.25, 3.79, 12.5, 7.58, 5.9, gable),
+            Box("wing", "general", 6.25, 8.99, 6.5, **lean, roof=Roof("gable", 35, "y", 0.4)),
+        ),
+        **{
+            f"tall box in a {roof.style}": _two(
+                Box("main", "general", 6, 5, 12, 10, 4.9, roof),
+                Box("tall", "general", 7, 6, 4, 4, 10, gable),
+            )
+            for roof in (gable, shed, hip)
+        },
+    }
+
+
+@pytest.mark.parametrize("name", _roofs_before_walls())
+def test_no_element_is_sunk_in_a_lower_roof(name):
+    mass = _roofs_before_walls()[name]
+    for seed in range(2):
+        done = made(mass, seed)[0]
+        assert sunk(done) == []
+        assert list(building_problems(done)) == []
+
+
+def test_no_sample_house_has_a_window_sunk_in_a_roof():
+    for style in ("victorian", "split_garage", "hip_porches"):
+        houses = read([str(HOUSES / f"{style}.jsonl")], "building")
+        assert [house.id for house in houses if sunk(house)] == []
 
 
 # --- library and colours ------------------------------------------------------------------------

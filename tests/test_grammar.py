@@ -14,6 +14,7 @@ from facade_tools.artifacts.store import read_one
 from facade_tools.errors import Infeasible, InvalidInput
 from facade_tools.grammar.derivation import leaves, nodes, painted
 from facade_tools.grammar.expressions import automaton, parse, shape
+from facade_tools.grammar.extents import needed_sizes
 from facade_tools.grammar.library import builtin, builtin_names, load
 from facade_tools.grammar.plan import plan
 from facade_tools.grammar.sampling import sample_derivation
@@ -221,8 +222,63 @@ def test_grammars_that_do_not_fit_are_refused_with_the_place(grammar, pointer):
 
 def test_derivations_that_do_not_end_are_refused():
     grammar = toy(A=Rule("up", "A a"))
-    with pytest.raises(Infeasible):
+    with pytest.raises(InvalidInput, match="/rules/A/into: A never ends"):
         sample_derivation(grammar, 10, 10, rng=np.random.default_rng(0))
+    grammar = toy(A=Rule("up", "A (A | a) | a"))
+    with pytest.raises(Infeasible, match=r"does not end: .* at 'A'"):
+        for seed in range(40):
+            sample_derivation(grammar, 10, 10, rng=np.random.default_rng(seed))
+
+
+def rows_of(tile, **more):
+    """Floors of tiles that are nothing but a window, of a height that only the window bounds."""
+    return toy(
+        A=Rule("up", "a (B a)+", **more),
+        B=Rule("right", "a (C a)+"),
+        C=Rule("up", "b", sizes={"b": tile}),
+    )
+
+
+SIZES = [(0.2, 0.25), (0.9, 0.95), (0.05, 0.06)]
+
+
+@pytest.mark.parametrize("bounds", SIZES)
+@pytest.mark.parametrize("seed", range(4))
+def test_random_sizes_lie_within_their_bounds(bounds, seed):
+    grammar = rows_of(Size(*bounds))
+    tree = sample_derivation(grammar, 240, 360, rng=np.random.default_rng(seed))
+    windows = [n.scope[3] - n.scope[1] for n in nodes(tree) if n.symbol == "b"]
+    assert windows
+    assert 360 * bounds[0] - 1 <= min(windows) <= max(windows) <= 360 * bounds[1] + 1
+
+
+@pytest.mark.parametrize("name", BUILTIN)
+def test_random_facades_of_shipped_grammars_keep_their_bounds(name):
+    grammar = builtin(name)
+    for seed in range(40):
+        tree = sample_derivation(grammar, 240, 360, rng=np.random.default_rng(seed))
+        for node in nodes(tree):
+            axis = 0 if node.split == "right" else 1
+            for part in node.children:
+                size = grammar.rules[node.symbol].sizes.get(part.symbol, Size())
+                length = part.scope[axis + 2] - part.scope[axis]
+                assert 360 * size.min - 1 <= length <= 360 * size.max + 1
+
+
+def test_sizes_that_fit_no_facade_are_infeasible():
+    grammar = toy(A=Rule("up", "a b a b a", sizes={"b": Size(min=0.6)}))
+    with pytest.raises(Infeasible, match="/rules/A: no parts fill"):
+        sample_derivation(grammar, 240, 360, rng=np.random.default_rng(0))
+
+
+def test_needed_sizes_follow_from_the_parts():
+    sizes = needed_sizes(rows_of(Size(0.2, 0.25)))
+    assert (sizes["A"]["B"].min, sizes["A"]["B"].max) == (0.2, 0.25)
+    assert sizes["A"]["a"] == sizes["B"]["C"] == Size()
+    stacked = toy(A=Rule("up", "B"), B=Rule("up", "(a b?)+", sizes={"a": Size(0.1, 0.3)}))
+    assert needed_sizes(stacked)["A"]["B"] == Size(0.1, 10.0)
+    kept = rows_of(Size(0.2, 0.25), sizes={"B": Size(max=0.1)})
+    assert needed_sizes(kept)["A"]["B"] == Size(max=0.1)
 
 
 def test_sample_grammar_writes_parses_that_validate(facade, tmp_path):
@@ -233,6 +289,26 @@ def test_sample_grammar_writes_parses_that_validate(facade, tmp_path):
     assert facade("validate", out).returncode == 0
     again = facade("sample-grammar", "tskp10", "-n", 3)
     assert again.stdout == out.read_bytes()
+
+
+def test_sizes_that_cannot_be_kept_name_the_file_and_the_rule(facade_here, tmp_path):
+    path = tmp_path / "tight.yaml"
+    path.write_text(
+        "schema: facade-tools/grammar/1\nid: tight\naxiom: A\nterminals: {a: wall, b: window}\n"
+        "rules: {A: {split: up, into: a b a b a, sizes: {b: {min: 0.6}}}}\n"
+    )
+    done = facade_here("sample-grammar", path)
+    assert (done.returncode, done.stdout) == (4, b"")
+    assert f"{path}: no facade of 240 × 360 pixels".encode() in done.stderr
+    assert b"/rules/A" in done.stderr
+
+
+def test_several_facades_do_not_go_into_one_json_file(facade_here, tmp_path):
+    out = tmp_path / "two.json"
+    done = facade_here("sample-grammar", "plain", "-n", 2, "-o", out)
+    assert done.returncode == 2
+    assert b"several facades" in done.stderr
+    assert not out.exists()
 
 
 def test_unknown_grammars_are_named(facade):

@@ -87,7 +87,8 @@ def test_an_id_that_stands_twice_is_refused(facade, tmp_path) -> None:
         (tmp_path / name).write_text(document)
     run = facade("import", tmp_path)
     assert run.returncode == 3
-    assert b"stands twice" in run.stderr
+    assert b"error: two: " in run.stderr
+    assert b"'h' stands twice" in run.stderr
 
 
 def test_memory_does_not_grow_with_the_stream(tmp_path) -> None:

@@ -11,6 +11,7 @@ import pytest
 from learned_tables import as_readings, table_layout
 from scipy.special import gammaln
 
+from facade_tools.artifacts.store import read_whole
 from facade_tools.errors import InvalidInput
 from facade_tools.exteriors import em, mixture, styles
 from facade_tools.exteriors.coordinates import Readings, read_attributes
@@ -341,7 +342,7 @@ def test_a_table_of_any_kind(tmp_path):
             out.writerow("" if rng.random() < 0.05 and j else x for j, x in enumerate(row))
     text = "groups: {pair: [a, b], size: {columns: [c], transform: log}}\nbits: {flags: [flag]}\n"
     (tmp_path / "groups.yaml").write_text(text)
-    paths = [str(tmp_path / "table.csv")], str(tmp_path / "groups.yaml")
+    paths = [read_whole(str(tmp_path / "table.csv"))], str(tmp_path / "groups.yaml")
     model = learn_table(*paths, rng=rng, options=LearnOptions(largest=3))
     assert [g.name for g in model.groups] == ["pair", "size"]
     assert model.count == 60

@@ -282,6 +282,18 @@ def test_command_makes_buildings(facade, tmp_path):
     assert again.stdout == result.stdout
 
 
+def test_command_refuses_a_known_box_that_no_storey_fits(facade, tmp_path):
+    partial_file, wanted = tmp_path / "low.yaml", tmp_path / "w.json"
+    wanted.write_text(json.dumps(encode(targets("box"))))
+    partial_file.write_text(
+        "schema: facade-tools/building/1\nid: x\npartial: true\nboxes:\n"
+        "  - {id: a, kind: general, x: 0, y: 0, width: 10, depth: 9, height: 1}\n"
+    )
+    done = facade("massgen", wanted, "--keep", partial_file, "-o", tmp_path / "out.json")
+    assert done.returncode == 3
+    assert f"{partial_file}: /boxes/0/height: 1 m" in done.stderr.decode()
+
+
 def test_view_shows_plan_and_energy_curve(facade, tmp_path):
     (building,) = made(targets("garage"))
     curve = building.tags["mass_energy_curve"]

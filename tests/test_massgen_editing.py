@@ -7,19 +7,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from facade_tools.artifacts.building import Box, Building, Element, Facade, Piece
+from facade_tools.artifacts.building import Box, Building, Element, Facade, Piece, Roof
 from facade_tools.errors import Infeasible
 from facade_tools.exteriors import mass_editing
 from facade_tools.exteriors.attributes import attribute_vector, building_attributes
 from facade_tools.exteriors.mass_editing import contradicted, loosened, suggestion
 from facade_tools.exteriors.mass_energy import GROUPS
 from facade_tools.exteriors.mass_hints import observed_zones, search_target
+from facade_tools.exteriors.mass_porches import hidden, settled_porches
 from facade_tools.exteriors.massgen import generate_mass
+from facade_tools.geometry.blocked import porch_strips
+from facade_tools.geometry.checks import element_rectangles, overlaps
 
 MAIN = Box("main", "general", 5, 4, 10, 8, 5.6)
 GARAGE = Box("added", "garage", 13, 2, 6, 6.5, 2.7)
 WANTED = building_attributes(Building("wanted", (MAIN,)))
 EDITED = Building("edited", (MAIN, GARAGE), partial=True)
+KNOWN_WINDOW = Element("window", "sash", 1.5, 0.9, 2.8, 1.4, known=True)
+KNOWN_DOOR = Element("door", "panel", 5.0, 0.0, 0.95, 2.1, main=True, known=True)
 
 
 def shares(**missed):
@@ -92,6 +97,81 @@ def test_complete_parts_are_not_added():
         WANTED, replace(EDITED, complete=("mass",)), rng=np.random.default_rng(0)
     )
     assert target.extra == 0
+
+
+def test_complete_mass_takes_no_tower():
+    special = {"chimney": 0, "tower": 1}
+    wanted = replace(WANTED, element=replace(WANTED.element, special=special))
+    seen = Building("seen", (MAIN,), partial=True, complete=("mass",))
+    for seed in range(3):
+        (building,) = generate_mass(wanted, rng=np.random.default_rng(seed), keep=seen)
+        assert [box.id for box in building.boxes if box.kind == "general"] == ["main"]
+
+
+def test_nothing_known_and_everything_complete_is_infeasible():
+    nothing = Building("n", (), partial=True, complete=("mass", "garage", "porch", "roof"))
+    with pytest.raises(Infeasible, match="general box"):
+        list(generate_mass(WANTED, rng=np.random.default_rng(0), keep=nothing))
+
+
+def test_storey_height_of_the_known_part_stays():
+    seen = Building("seen", (MAIN,), storey_height=2.7, partial=True)
+    (building,) = generate_mass(WANTED, rng=np.random.default_rng(0), keep=seen)
+    assert building.storey_height == building.targets.storey_height == 2.7
+
+
+def test_no_new_box_hides_a_known_one():
+    low = Box("garage", "garage", 13.0, 3.0, 6.0, 6.0, 2.7, Roof("hip", 26))
+    seen = Building("seen", (low, replace(MAIN, height=None)), partial=True)
+    high = Box("high", "general", 8.0, 5.0, 16.0, 10.0, 6.0)
+    wanted = building_attributes(Building("w", (high, replace(low, x=15.9))))
+    for seed in range(4):
+        (building,) = generate_mass(wanted, rng=np.random.default_rng(seed), keep=seen)
+        heights = {box.id: box.height for box in building.boxes}
+        for new in building.boxes[2:]:
+            for known in building.boxes[:2]:
+                over = new.kind != "porch" and _overlap(new, known) > 1e-6
+                assert not over or new.height <= heights[known.id] + 0.01
+
+
+def _overlap(a, b):
+    x = min(a.x + a.width / 2, b.x + b.width / 2) - max(a.x - a.width / 2, b.x - b.width / 2)
+    y = min(a.y + a.depth / 2, b.y + b.depth / 2) - max(a.y - a.depth / 2, b.y - b.depth / 2)
+    return min(x, y)
+
+
+def test_hidden_porch_goes_before_the_wall_and_a_visible_one_stays():
+    inside = Box("porch", "porch", 5.0, 1.0, 3.0, 2.0, 2.5)
+    assert hidden(inside, [MAIN])
+    (_, moved) = settled_porches((MAIN, inside), None)
+    assert (moved.x, moved.y) == (5.0, -1.0)
+    behind = replace(inside, y=6.9)
+    assert settled_porches((MAIN, behind), None)[1].y == MAIN.depth + 1.0
+    half = replace(inside, y=0.0)
+    assert settled_porches((MAIN, half), None) == (MAIN, half)
+    seen = Building("seen", (MAIN, inside), partial=True)
+    assert settled_porches(seen.boxes, seen) == seen.boxes
+
+
+@pytest.mark.parametrize("width", [2.2, 4.0, 6.0])
+def test_posts_and_roof_of_a_new_porch_leave_known_elements_free(width):
+    wall = Piece("front-1", "main", (0.0, 0.0, 0.0), 10.0, 3.0, (KNOWN_WINDOW, KNOWN_DOOR))
+    seen = Building("seen", (MAIN,), {"front": Facade((wall,))}, partial=True)
+    porch = Box("porch", "porch", 4.0 + width / 2, -1.0, width, 2.0, 2.6)
+    (_, moved) = settled_porches((MAIN, porch), seen)
+    roofed = replace(porch, x=moved.x, width=moved.width, roof=Roof("shed", 14, "y", 0.25))
+    whole = replace(seen, boxes=(MAIN, roofed))
+    strips = porch_strips(whole, roofed, "front", wall)
+    assert not overlaps(element_rectangles(wall.elements), strips).any()
+    assert abs(moved.x - porch.x) + abs(moved.width - width) < 2.5
+
+
+def test_porch_whose_roof_would_cross_a_known_window_is_left_out():
+    tall = replace(KNOWN_WINDOW, u=0.1, width=9.8, height=1.8)
+    wall = Piece("front-1", "main", (0.0, 0.0, 0.0), 10.0, 3.0, (tall,))
+    seen = Building("seen", (MAIN,), {"front": Facade((wall,))}, partial=True)
+    porch = Box("porch", "porch", 5.0, -1.0, 4.0, 2.0, 2.6)
+    assert settled_porches((MAIN, porch), seen) == (MAIN,)
 
 
 def test_suggestion_holds_to_less_where_the_model_knows_no_such_building(monkeypatch):

@@ -202,6 +202,13 @@ def _broken(model, change):
         (lambda d: d["groups"][0]["covariances"][0][0].__setitem__(0, -1.0), "/covariances/0"),
         (lambda d: d["groups"][0]["coefficients"].pop(), "/groups/0/coefficients"),
         (lambda d: d["groups"][0].update(inputs=["nobody"]), "/groups/0/inputs"),
+        (lambda d: d["groups"].append(d["groups"][0]), "/groups"),
+        (lambda d: d["groups"][0].update(direct=True), "/groups/0/hidden"),
+        (
+            lambda d: d["groups"][1]["channels"][0]["states"].append("?"),
+            "/groups/1/channels/0/states",
+        ),
+        (lambda d: d["training"]["ids"].pop(), "/training/values"),
     ],
 )
 def test_a_tampered_file_is_refused(model, change, pointer):

@@ -150,6 +150,11 @@ def test_a_picture_too_small_is_refused(shape):
         read(np.zeros((*shape, 3), np.uint8), Scale(height=2.0))
 
 
+def test_a_narrow_picture_is_too_small_where_it_is_read():
+    with pytest.raises(Infeasible, match="3×320 pixels at working size; expected 24 a side"):
+        read(np.zeros((6000, 60, 3), np.uint8), Scale(height=20.0))
+
+
 def test_profiles_are_those_of_a_product():
     down, across = np.zeros(40), np.zeros(50)
     down[5:15] = down[25:35] = 1.0
@@ -363,6 +368,7 @@ def test_the_command_writes_a_parse_and_its_pictures(tmp_path, facade_here):
 
 @pytest.mark.parametrize("options", [
     ("--method", "mrf", "--grammar", "plain"), ("--method", "forest", "--height", "12"),
+    ("--method", "mrf", "--solver", "walk"),
 ])  # fmt: skip
 def test_options_of_another_method_are_refused(options, facade_here):
     done = facade_here("parse-image", "front.png", *options)

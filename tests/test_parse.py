@@ -21,8 +21,9 @@ from facade_tools.grammar.plan import plan
 from facade_tools.grammar.reading import label_index
 from facade_tools.grammar.sampling import sample_derivation
 from facade_tools.grammar.segments import Cut
-from facade_tools.imaging.image_io import MAX_PIXELS, decoded, read_photo
+from facade_tools.imaging.image_io import MAX_PIXELS, decoded, read_labels, read_photo
 from facade_tools.segmentation import dp, walk
+from facade_tools.segmentation.classifier import default, save
 from facade_tools.segmentation.deriving import Frame, derivation, floors_of, regions_of
 from facade_tools.segmentation.energy import Layout, column_costs, energy, field_of, state_costs
 from facade_tools.segmentation.painting import render_facade
@@ -297,13 +298,10 @@ def animated_png():
     return data[:33] + chunk + data[33:]
 
 
-def gif(frames):
+def gif(frames, control=b"\x21\xf9\x04\0\0\0\0\0"):
     head = b"GIF89a" + struct.pack("<HH", 2, 2) + b"\xf0\0\0" + b"\0\0\0\xff\xff\xff"
-    frame = (
-        b"\x21\xf9\x04\0\0\0\0\0\x2c"
-        + struct.pack("<HHHH", 0, 0, 2, 2)
-        + b"\0\x02\x03\x44\x02\x05\0"
-    )
+    place = b"\x2c" + struct.pack("<HHHH", 0, 0, 2, 2)
+    frame = control + place + b"\0\x02\x03\x44\x02\x05\0"
     return head + frame * frames + b"\x3b"
 
 
@@ -323,6 +321,8 @@ def huge_png():
         (jpeg(gradient())[:-200], "truncated"),
         (huge_png(), "20000×20000"),
         (gif(3), "animated"),
+        (gif(2, control=b""), "animated"),
+        (gif(1)[:-1], "truncated"),
         (animated_png(), "animated"),
         (cv2.imencodemulti(".tif", [gradient(), gradient()])[1].tobytes(), "several pages"),
         (b"RIFF\0\0\0\0WAVEfmt ", "no pixels|header"),
@@ -334,6 +334,19 @@ def test_what_cannot_be_used_is_refused_in_one_line(data, words):
         decoded(data, "photo")
     assert "\n" not in str(error.value)
     assert MAX_PIXELS < 20_000**2
+
+
+def test_a_still_gif_is_read():
+    assert decoded(gif(1), "x").shape == (2, 2, 3)
+    coloured = gif(1).replace(b"\0\x02\x03", b"\x80" + bytes(6) + b"\x02\x03")  # own colours
+    assert decoded(coloured, "x").shape == (2, 2, 3)
+
+
+def test_truncated_label_maps_are_named_so(tmp_path):
+    path = tmp_path / "mask.png"
+    path.write_bytes(png(np.eye(64, dtype=np.uint8))[:-20])
+    with pytest.raises(InvalidInput, match=r"mask.png: is a truncated PNG; expected a whole file"):
+        read_labels(str(path))
 
 
 def test_missing_files_are_invalid_input(tmp_path):
@@ -406,3 +419,89 @@ def test_a_rectified_photograph_keeps_its_name_and_homography(facade_here, tmp_p
     other = facade_here("parse-image", straight, "--rectify", report)
     assert other.returncode == 3
     assert b"another picture" in other.stderr
+
+
+@pytest.mark.parametrize("method", ["forest", "mrf"])
+def test_a_mask_of_another_size_is_refused(method, facade_here, photos, tmp_path):
+    mask = tmp_path / "mask.png"
+    mask.write_bytes(png(np.zeros((10, 12), np.uint8)))
+    for more in ((), ("--rectify", "1,1 88,1 88,118 1,118")):
+        words = ("parse-image", photos / "noise.png", "--method", method, "--mask", mask, *more)
+        done = facade_here(*words)
+        assert (done.returncode, done.stdout) == (3, b"")
+        message = "noise.png: the mask has 12×10 pixels, the picture 90×120; expected the same"
+        assert message.encode() in done.stderr
+
+
+@pytest.mark.parametrize("option", ["--labels", "--raw-labels", "--overlay", "-o"])
+def test_pictures_of_one_name_do_not_overwrite_each_other(option, facade_here, photos, tmp_path):
+    other = tmp_path / "flat.bmp"
+    other.write_bytes(cv2.imencode(".bmp", gradient())[1].tobytes())
+    done = facade_here("parse-image", photos / "flat.png", other, option, tmp_path / "out/")
+    assert (done.returncode, done.stdout) == (3, b"")
+    assert b"id 'flat' stands twice" in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("words", [
+    ("flat.png", "--overlay", "flat.png"), ("flat.png", "-o", "flat.png"),
+    ("flat.png", "noise.png", "--labels", "."), (".", "--raw-labels", "../photos/"),
+    ("flat.png", "--mask", "mask.png", "--labels", "mask.png"),
+    ("flat.png", "--labels", "x.png", "--overlay", "./x.png"),
+])  # fmt: skip
+def test_no_result_overwrites_an_input_or_another_result(words, facade_here, photos, tmp_path):
+    folder = tmp_path / "photos"
+    folder.mkdir()
+    for path in photos.iterdir():
+        (folder / path.name).write_bytes(path.read_bytes())
+    (folder / "mask.png").write_bytes(png(np.zeros((80, 60), np.uint8)))
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    done = facade_here("parse-image", *words, cwd=folder)
+    assert (done.returncode, done.stdout) == (2, b"")
+    assert b"would be" in done.stderr
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+@pytest.mark.parametrize("words", [
+    ("flat.png", "--rectify", "1,2"), ("flat.png", "--rectify", "Auto"),
+    ("flat.png", "noise.png", "-o", "two.json"),
+])  # fmt: skip
+def test_mistakes_of_usage_come_before_any_picture(words, facade_here, photos):
+    done = facade_here("parse-image", *words, cwd=photos)
+    assert (done.returncode, done.stdout) == (2, b"")
+    assert not (photos / "two.json").exists()
+
+
+def test_a_classifier_that_does_not_fit_is_refused_once(facade_here, photos, tmp_path):
+    few, other = tmp_path / "few.npz", tmp_path / "other.npz"
+    shipped = default()
+    stage = shipped.stages[0]
+    kept = replace(stage, value=stage.value[:, :1], classes=5)
+    alone = replace(shipped, classes=CLASSES[:5], stages=(kept,), fine=1, network=None)
+    few.write_bytes(save(alone))
+    far = replace(kept, feature=np.full_like(kept.feature, 30_000))
+    other.write_bytes(save(replace(alone, stages=(far,))))
+    words = ("parse-image", photos, "--on-error", "skip", "--classifier")
+    done = facade_here(*words, few)
+    assert (done.returncode, done.stdout) == (3, b"")
+    lines = done.stderr.decode().splitlines()
+    assert len(lines) == 1
+    assert lines[0].startswith(f"facade parse-image: error: {few}: the classifier knows")
+    assert lines[0].endswith("needs shop, sky, chimney too; --grammar plain fits")
+    assert facade_here(*words, few, "--grammar", "plain").returncode == 0
+    done = facade_here(*words, other, "--grammar", "plain")
+    message = f"facade parse-image: error: {other}: the classifier was trained on other features"
+    assert done.stderr.decode().splitlines() == [f"{message} than these"]
+
+
+def test_a_label_that_no_classifier_knows_is_the_grammars_fault(facade_here, photos, tmp_path):
+    path = tmp_path / "own.yaml"
+    path.write_text(
+        "schema: facade-tools/grammar/1\nid: own\naxiom: A\nterminals: {a: wall, b: stairs}\n"
+        "rules: {A: {split: up, into: a b}}\n"
+    )
+    done = facade_here("parse-image", photos, "--on-error", "skip", "--grammar", path)
+    assert done.returncode == 3
+    assert done.stderr.decode().count("\n") == 1
+    assert f"{path}: the classifier knows".encode() in done.stderr
+    assert b"grammar 'own' needs stairs too" in done.stderr

@@ -12,7 +12,7 @@ from facade_tools.errors import InvalidInput
 from facade_tools.grammar.library import builtin
 from facade_tools.imaging.homography import applied, fitted_homography, warped
 from facade_tools.imaging.image_io import decoded
-from facade_tools.imaging.rectify import automatic, from_corners
+from facade_tools.imaging.rectify import automatic, from_corners, from_report
 from facade_tools.segmentation.painting import render_facade
 
 WIDTH, HEIGHT = 330, 440
@@ -108,11 +108,20 @@ def test_pictures_without_structure_are_refused(kind):
         [[0, 0], [5, 0], [10, 0], [0, 10]],
         [[0, 0], [0, 10], [10, 10], [10, 0]],
         [[0, 0], [np.nan, 0], [10, 10], [0, 10]],
+        [[30, 0], [40, 0], [40, 10], [30, 10]],
+        [[45, -35], [75, -5], [55, 15], [25, -15]],
     ],
 )
 def test_corners_that_are_no_quadrilateral_are_refused(corners):
     with pytest.raises(InvalidInput):
         from_corners((20, 20, 3), np.array(corners, np.float64))
+
+
+def test_reports_of_numbers_without_bounds_are_refused():
+    for entry in (1e308, np.inf, np.nan):
+        with pytest.raises(ValueError, match="no homography"):
+            from_report([[entry, 0, 0], [0, entry, 0], [0, 0, 1]], [40, 30], 1.0)
+    assert from_report(np.eye(3).tolist(), [40, 30], 1.0).size == (40, 30)
 
 
 def test_the_command(facade, front, tmp_path):
@@ -129,4 +138,10 @@ def test_the_command(facade, front, tmp_path):
     near = cv2.resize(front, told["size"]).astype(float) - picture
     assert np.abs(near).mean() < 12
     assert facade("rectify", photo, "--corners", "1,2 3,4", "-o", out).returncode == 2
+    before = photo.read_bytes()
+    for words in (("-o", photo), ("-o", tmp_path / "a.png", "--report", photo)):
+        over = facade("rectify", photo, "--corners", text, *words)
+        assert over.returncode == 2
+        assert b"is an input and would be overwritten" in over.stderr
+        assert photo.read_bytes() == before
     assert facade("rectify", tmp_path / "none.png", "-o", out).returncode == 3

@@ -20,7 +20,9 @@ from facade_tools.exteriors.coordinates import read_attributes
 from facade_tools.exteriors.drawing import SampleOptions, sample_attributes
 from facade_tools.exteriors.evaluation import negative_log_density
 from facade_tools.exteriors.learning import LearnOptions, learn_model
+from facade_tools.exteriors.physical import settle
 from facade_tools.exteriors.prior import shipped_prior
+from facade_tools.exteriors.relations import contradictions
 from facade_tools.exteriors.row_bytes import Row, joined, text_column
 from facade_tools.exteriors.sample_lines import sample_lines
 from facade_tools.exteriors.serialisation import network_of
@@ -68,6 +70,7 @@ def assert_possible(a: Attributes) -> None:
         assert 0 <= exposure <= 1
     for porch, back in zip(m.porch, (False, True), strict=True):
         assert not any(porch) or (porch[1] >= 0.5) == back
+        assert not any(porch) or porch[5] >= min(porch[2:4]) / (2 * sum(porch[2:4])) - 1e-9
         if gw and porch[2]:
             gaps = [
                 abs(m.garage[i] - porch[i]) * size - (m.garage[2 + i] + porch[2 + i]) / 2
@@ -183,7 +186,8 @@ def test_weighted_draws_average_to_the_density(model, plain, houses):
 def test_completion_keeps_what_is_given_to_the_last_bit(model, houses):
     width = Given("11.123456789012344")
     mass = replace(houses[30].mass, bbox=(width, None, 5.5), far=None, arf=(None,) * 3, bdry=None)
-    given = Attributes("p", mass=mass, storey_height=2.75, present=Present(garage=True))
+    there = Present(garage=any(mass.garage))
+    given = Attributes("p", mass=mass, storey_height=2.75, present=there)
     for sample in draw(model, 5, given=given, top=True):
         assert sample.mass.bbox[0] is width
         assert sample.mass.bbox[2] == 5.5
@@ -226,6 +230,98 @@ def test_far_without_floors_is_met(model):
     for sample in draw(model, 20, given=Attributes("f", mass=mass)):
         assert sample.mass.far == 1.4
         assert 1.4 * sample.mass.arf[0] == pytest.approx(0.8)
+
+
+FLOORS = [
+    {"arf": (0.6, None, None)},
+    {"arf": (0.4, None, None)},
+    {"arf": (1.0, None, None)},
+    {"arf": (None, 0.3, None)},
+    {"arf": (None, 0.5, None)},
+    {"arf": (None, None, 0.3)},
+    {"arf": (None, None, 0.0)},
+    {"arf": (0.6, 0.4, None)},
+    {"arf": (None, 0.4, 0.2)},
+    {"far": 1.2, "arf": (0.6, 0.4, 0.0)},
+    {"far": 1.2, "arf": (0.6, None, None)},
+    {"far": 1.2, "arf": (None, 0.4, None)},
+    {"far": 1.5, "arf": (None, None, 0.2)},
+    {"far": 1.2, "bcr": 0.7},
+    {"far": 1.2, "bcr": 0.7, "arf": (None, 0.4, None)},
+    {"bcr": 0.7, "arf": (0.6, None, None)},
+    {"far": 1.8},
+    {"bdry": 4.6},
+    {"bbox": (30.0, None, None), "bdry": 5.2},
+    {"bcr": 1.0, "bdry": 4.3},
+    {"bbox": (9.0, 9.0, None), "bcr": 0.8, "bdry": 5.0},
+]
+
+
+@pytest.mark.parametrize("known", FLOORS)
+def test_floors_and_boundary_follow_what_is_given(model, known):
+    given = Attributes("partial", mass=replace(Attributes("").mass, **known))
+    for sample in draw(model, 60, given=given):
+        assert_possible(sample)
+        for name, value in known.items():
+            found = getattr(sample.mass, name)
+            pairs = zip(value, found, strict=True) if isinstance(value, tuple) else [(value, found)]
+            assert all(stated is None or stated == drawn for stated, drawn in pairs)
+
+
+@pytest.mark.parametrize("storey", [2.4, 2.7, 3.3])
+def test_a_stated_storey_height_is_kept_and_suits_the_floors(model, storey):
+    given = replace(Attributes("partial", storey_height=storey), mass=replace(WIDE, far=1.8))
+    for sample in draw(model, 60, given=given):
+        assert_possible(sample)
+        assert sample.storey_height == storey
+
+
+WIDE = replace(Attributes("").mass, bbox=(11.0, 9.0, None))
+GARAGE = (0.5, 0.5, 4.0, 5.0, 2.5, 0.6)
+IMPOSSIBLE = {
+    "/mass/arf": replace(WIDE, arf=(0.5, 0.4, 0.0)),
+    "/mass/arf/1": replace(WIDE, arf=(None, 0.7, None)),
+    "/mass/far": replace(WIDE, far=0.5, bcr=0.8),
+    "/mass/bdry": replace(WIDE, bdry=3.9),
+    "/mass/garage/2": replace(WIDE, garage=(0.5, 0.5, 12.0, 5.0, 2.5, 0.6)),
+    "/mass/garage/0": replace(WIDE, garage=(0.05, *GARAGE[1:])),
+    "/mass/porch/0/1": replace(WIDE, porch=((0.5, 0.9, 2.0, 1.0, 2.5, 0.6), (None,) * 6)),
+    "/element/roof": WIDE,
+    "/present/garage": replace(WIDE, garage=GARAGE),
+}
+
+
+@pytest.mark.parametrize("pointer", IMPOSSIBLE)
+def test_contradictions_are_infeasible_and_named(model, pointer):
+    given = Attributes("odd", mass=IMPOSSIBLE[pointer])
+    if pointer == "/element/roof":
+        given = replace(given, element=ElementAttributes(roof={"flat": 0, "gable": 0, "hip": 0}))
+    if pointer == "/present/garage":
+        given = replace(given, present=Present(garage=False))
+    assert [found.pointer for found in contradictions(given)] == [pointer]
+    with pytest.raises(Infeasible, match=f"odd: {pointer}: "):
+        draw(model, 1, given=given)
+
+
+def test_a_part_with_a_size_of_0_is_absent(model):
+    given = Attributes("none", mass=replace(WIDE, garage=(None, 0.0, 0.0, None, None, 0.0)))
+    for sample in draw(model, 20, given=given):
+        assert sample.mass.garage == (0.0,) * 6
+
+
+def test_samples_and_houses_contradict_nothing(model, houses):
+    for row in (*houses, *draw(model, 500)):
+        assert not list(contradictions(row))
+
+
+def test_a_second_floor_of_almost_nothing_is_none(model):
+    """As small as an atom's tolerance: the storeys count it out, so no share may be written."""
+    network = network_of(model)
+    given = read_attributes(draw(model, 3), network.layout)
+    (r1,) = (v for v, g in zip(given.values, network.layout.groups, strict=True) if g.name == "far")
+    r1[:] = 5e-7
+    settle(given.values, network.layout)
+    assert (r1 == 0).all()
 
 
 def test_top_is_sorted_and_distinct(model):

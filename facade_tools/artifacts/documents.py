@@ -77,6 +77,17 @@ def parse_yaml(data: bytes) -> Any:
         raise InvalidInput(f"not valid YAML: {error}".split("\n")[0]) from None
 
 
+def check_finite(value: Any, pointer: str = "") -> None:
+    """Raise InvalidInput, with the pointer, where a YAML value holds `.nan` or `.inf`."""
+    if isinstance(value, float) and not isfinite(value):
+        raise InvalidInput(f"{value} is no finite number; expected one, or null", pointer=pointer)
+    if isinstance(value, dict | list):
+        rows = value.items() if isinstance(value, dict) else enumerate(value)
+        for key, item in rows:
+            part = str(key).replace("~", "~0").replace("/", "~1")
+            check_finite(item, f"{pointer}/{part}")
+
+
 @cache
 def _yaml_loader() -> Any:
     import yaml

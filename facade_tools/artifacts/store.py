@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from ..errors import InvalidInput
-from .documents import decode, parse_json, parse_yaml
+from .documents import check_finite, decode, parse_json, parse_yaml
 from .provenance import Source
 
 MAX_DOCUMENT_BYTES = 512 << 20
@@ -33,6 +33,7 @@ class RawItem:
             if not self.yaml:
                 return parse_json(self.data)
             document = parse_yaml(self.data)
+            check_finite(document)
         except InvalidInput as error:
             raise error.at(self.source, self.line) from None
         if implied and isinstance(document, dict) and "schema" not in document:
@@ -95,6 +96,17 @@ def read_all(paths: Iterable[str], *kinds: str) -> tuple[list[Any], tuple[Source
             artifacts.append(item.artifact(*kinds))
         sources.append(Source(_name(path), running.hexdigest()))
     return artifacts, tuple(sources)
+
+
+def read_whole(path: str, stdin: BinaryIO | None = None) -> RawItem:
+    """Return a whole file that is no artifact (a table), or standard input where `path` is `-`."""
+    if path == "-":
+        return _whole(stdin or sys.stdin.buffer, path, False)
+    try:
+        with Path(path).open("rb") as file:
+            return _whole(file, path, False)
+    except OSError as error:
+        raise unreadable(path, error) from None
 
 
 def digest(path: str) -> Source:

@@ -64,6 +64,12 @@ def _refuse_foreign(path: Path, fresh: Path) -> None:
         raise OutputFailed(f"{path}: holds other files ({min(extra)}); name an empty or new folder")
 
 
+def check_target(path: Path) -> None:
+    """Raise OutputFailed where a file at `path` would: before the work that it takes to fill it."""
+    if path.is_dir() or not path.parent.is_dir():
+        raise OutputFailed(f"{path}: cannot be written; expected a file in a folder that exists")
+
+
 def write_bytes(path: Path, data: bytes) -> None:
     """Write `data` to `path` atomically."""
     with atomic_file(path) as file:

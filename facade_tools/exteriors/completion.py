@@ -8,20 +8,22 @@ from typing import Any
 
 import numpy as np
 
-from ..artifacts.attributes import Attributes
+from ..artifacts.attributes import Attributes, MassAttributes
 from ..errors import Infeasible
 from .conditioning import draw_given, resampled
 from .coordinates import Bits, Floats, Readings, read_attributes
 from .dataset import Masks
-from .groups import Group, least_bdry
+from .groups import ABSENT, ATOM_TOLERANCE, Group, least_bdry
 from .layout import Layout
 from .network import Network
-from .physical import Columns, settle
+from .physical import Columns, settle, storey_heights
+from .relations import ROUNDED, completed, contradictions, states_storeys
 from .sampling import Draws
 from .shared_values import SharedValues, take_up
 
 BLOCK = 1024  # weighted draws of one resampling
 ATTEMPTS = 40  # blocks without one possible draw before completion gives up
+NEAR = 1e-9  # relative: what is off by less fits
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +47,10 @@ def completions(
 
     shared: values that what is not given takes up again.
     """
-    row = read_attributes([given], network.layout, groups)
+    for pointer, message in contradictions(given):
+        raise Infeasible(f"{given.id}: {pointer}: {message}")
+    known = completed(given)
+    row = read_attributes([known], network.layout, groups)
     fixed = tuple((~np.isnan(v)).astype(np.int8) for v in row.values)
     failures = 0
     while True:
@@ -53,7 +58,7 @@ def completions(
         draws = resampled(particles, rng=rng)
         held = tuple(np.tile(f, (len(draws.style), 1)) for f in fixed)
         take_up(draws.readings.values, shared, rng=rng, fixed=held)
-        possible = accept(draws.readings, network, given, held)
+        possible = accept(draws.readings, network, known, held)
         if possible.any():
             failures = 0
             kept = replace(
@@ -68,22 +73,28 @@ def completions(
 
 
 def accept(rows: Readings, network: Network, given: Attributes, held: tuple[Bits, ...]) -> Masks:
-    """Settle rows in place and tell which (n,) are possible with what is given (`held`)."""
+    """Settle rows in place and tell which (n,) are possible with what is given (`held`).
+
+    given: with what follows from it (`relations.completed`).
+    """
     layout = network.layout
-    _solve(rows, layout_columns(rows, network), given)
-    settle(rows.values, layout, _with_solved(held, layout, given))
     columns = layout_columns(rows, network)
-    good = np.ones(len(rows), dtype=np.bool_)
+    good = np.ones(len(rows), dtype=np.bool_) & _solve_floors(columns, given.mass)
+    settle(rows.values, layout, _with_solved(held, layout, given.mass))
+    good &= _solve_boundary(columns, given.mass)
     sizes = columns.get("width", "depth", "height")
     if given.bounds is not None and sizes:
         for column, least in zip(sizes, given.bounds.bbox_min, strict=True):
             good &= column >= least * (1 - 1e-12)
-    for name in ("r1", "x"):
-        found = columns.get(name)
-        if found:
-            low, high = (0.0, 1.0) if name == "r1" else (1.0, np.inf)
-            good &= (found[0] >= low - 1e-9) & (found[0] <= high + 1e-9)
+    if states_storeys(given) and not _heights_known(given.mass):
+        usual = storey_heights(rows.values, layout, given.storey_height)
+        good &= np.abs(usual / given.storey_height - 1) <= NEAR
     return good & _garage_fits(columns)
+
+
+def _heights_known(mass: MassAttributes) -> bool:
+    """Tell whether eaves and floors are given: a storey height has no more to decide."""
+    return mass.bbox[2] is not None and None not in mass.arf
 
 
 def layout_columns(rows: Readings, network: Network) -> Columns:
@@ -92,37 +103,79 @@ def layout_columns(rows: Readings, network: Network) -> Columns:
 
 
 def _garage_fits(columns: Columns) -> Masks:
+    """Tell where the garage, given or not, is no larger than the house and inside its plan."""
     good: Any = True
-    for size in ("width", "depth", "height"):
+    for size, place in (("width", "px"), ("depth", "py"), ("height", "")):
         pair = columns.get(size, f"garage.{size}")
-        if pair:
-            house, garage = pair
-            good = good & (~np.isfinite(garage) | (garage <= house * (1 + 1e-9)))
+        if not pair:
+            continue
+        house, garage = pair
+        here = np.isfinite(garage)
+        good = good & (~here | (garage <= house * (1 + NEAR)))
+        at = columns.get(f"garage.{place}") if place else None
+        if at:
+            share = np.where(here, garage, 0.0) / house
+            off = np.abs(np.where(here, at[0], 0.5) - 0.5)
+            good = good & (off + share / 2 <= 0.5 + ROUNDED)
     return np.asarray(good)
 
 
-def _solve(rows: Readings, columns: Columns, given: Attributes) -> None:
-    """Meet given numbers that only together with drawn ones fix a free coordinate.
+def _solve_floors(columns: Columns, mass: MassAttributes) -> Masks:
+    """Meet given floors that only together with drawn ones fix a free coordinate, in place.
 
-    far without arf fixes r1, bdry without w, d or bcr fixes x, once the others are drawn.
+    Returns where that is possible. far and one of arf also fix a bcr that is not given.
     """
     floors = columns.get("bcr", "r1", "r2")
-    if floors and given.mass.far is not None and given.mass.arf[1] is None:
-        bcr, r1, r2 = floors
-        upper = 1.0 + np.where(np.isfinite(r2), r2, 0.0)
-        r1[:] = (given.mass.far / bcr - 1.0) / upper
-    sides = columns.get("width", "depth", "bcr", "x")
-    known = (*given.mass.bbox[:2], given.mass.bcr)
-    if sides and given.mass.bdry is not None and None in known:
-        w, d, bcr, x = sides
-        x[:] = given.mass.bdry / least_bdry(w, d, bcr)
+    if not floors or not _solves_floors(mass):
+        return np.asarray(True)
+    bcr, r1, r2 = floors
+    ratios = _ratios(mass, bcr, r1, np.where(np.isfinite(r2), r2, 0.0))
+    good = np.all([(share >= -NEAR) & (share <= 1 + NEAR) for share in ratios], axis=0)
+    first, second = (np.clip(np.nan_to_num(share), 0.0, 1.0) for share in ratios)
+    r1[:], r2[:] = first, np.where(first <= ATOM_TOLERANCE, ABSENT, second)
+    if mass.far is not None and (mass.arf[1] is not None or mass.arf[2] is not None):
+        found = mass.far / (1.0 + first + first * second)
+        good &= found <= 1 + NEAR
+        bcr[:] = np.minimum(found, 1.0)
+    return np.asarray(good)
 
 
-def _with_solved(held: tuple[Bits, ...], layout: Layout, given: Attributes) -> tuple[Bits, ...]:
-    """Return what must stay, with the floors that `_solve` has found for a given far."""
-    if given.mass.far is None or given.mass.arf[1] is not None:
+def _solves_floors(mass: MassAttributes) -> bool:
+    """Tell whether floors are given, but not all: with `relations.completed` one share or far."""
+    return None in mass.arf and (mass.far is not None or any(v is not None for v in mass.arf))
+
+
+def _ratios(mass: MassAttributes, bcr: Floats, r1: Floats, r2: Floats) -> tuple[Floats, Floats]:
+    """Return r1 and r2 that meet the given share of a floor, or far, the other one as drawn."""
+    first, second, third = mass.arf
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if third is not None:
+            needed = third * (1.0 + r1) / (r1 * (1.0 - third))
+            return r1, np.where(r1 > ATOM_TOLERANCE, needed, 0.0 if third == 0 else np.inf)
+        if second is not None:
+            return second / (1.0 - second * (1.0 + r2)), r2
+        far = bcr / first if first is not None else mass.far or 0.0
+        return (far / bcr - 1.0) / (1.0 + r2), r2
+
+
+def _solve_boundary(columns: Columns, mass: MassAttributes) -> Masks:
+    """Meet a given bdry by x, in place, and tell where the plan allows as little as that."""
+    sides = columns.get("width", "depth", "bcr")
+    if not sides or mass.bdry is None:
+        return np.asarray(True)
+    ratio = mass.bdry / least_bdry(*sides)
+    free = None in (*mass.bbox[:2], mass.bcr)
+    x = columns.get("x")
+    if x and free:
+        x[0][:] = np.maximum(ratio, 1.0)
+    return np.asarray(ratio >= 1 - (NEAR if free else ROUNDED))
+
+
+def _with_solved(held: tuple[Bits, ...], layout: Layout, mass: MassAttributes) -> tuple[Bits, ...]:
+    """Return what must stay, with the floors that `_solve_floors` has found."""
+    if not _solves_floors(mass):
         return held
-    floors = [[c.name in ("r1", "r2") for c in group.coordinates] for group in layout.groups]
+    floors = [[c.name in ("bcr", "r1", "r2") for c in group.coordinates] for group in layout.groups]
     return tuple(
         np.maximum(mask, np.array(row, dtype=np.int8))
         for mask, row in zip(held, floors, strict=True)
@@ -133,13 +186,16 @@ def _with_solved(held: tuple[Bits, ...], layout: Layout, given: Attributes) -> t
 
 
 def overlaid(sample: Attributes, given: Attributes) -> Attributes:
-    """Return the sample with every observed number of `given` in its own digits."""
+    """Return the sample with every observed number of `given` in its own digits.
+
+    A storey height that is not stated stays the sample's, which suits its floors.
+    """
     return replace(
         sample,
         mass=_merge(sample.mass, given.mass),
         facade=_merge(sample.facade, given.facade),
         element=_merge(sample.element, given.element),
-        storey_height=given.storey_height,
+        storey_height=given.storey_height if states_storeys(given) else sample.storey_height,
         bounds=given.bounds,
         tags={**sample.tags, **given.tags},
     )

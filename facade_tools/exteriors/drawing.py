@@ -203,7 +203,8 @@ def annotated(source: Source, block: Block, first: int) -> Iterator[Attributes]:
     rows = replace(block.readings, ids=block_ids(source, block, first))
     layout, finder = source.network.layout, source.finder
     near = list(finder.nearest(rows)) if source.options.neighbours else []
-    heights = storey_heights(rows.values, layout, source.model.storey_height)
+    typical = (source.given or source.model).storey_height
+    heights = storey_heights(rows.values, layout, typical)
     density, style = block.density.tolist(), block.style.tolist()
     for i, row in enumerate(write_attributes(rows, layout, heights, source.options.groups)):
         names = {name: finder.ids[index[i]] for name, index, _ in near if index[i] >= 0}

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
 
 import numpy as np
 
@@ -33,8 +35,26 @@ def negative_log_density(
     readings = read_attributes(rows, network.layout, groups)
     empty = np.flatnonzero(nothing_observed(readings))
     if len(empty):
-        raise InvalidInput(f"{readings.ids[empty[0]]}: nothing is observed; expected an attribute")
+        raise unseen(rows[empty[0]])
     return -row_log_density(network, readings)
+
+
+def unseen(row: Attributes) -> InvalidInput:
+    """Return the error of a row in which the model sees nothing, and what there is in it."""
+    names = [
+        f"{level}.{name}"
+        for level in ("mass", "facade")
+        for name, value in asdict(getattr(row, level)).items()
+        if _known(value)
+    ]
+    if not names:
+        return InvalidInput(f"{row.id}: nothing is observed; expected an attribute")
+    known = f"{row.id}: of {', '.join(names)} alone no coordinate of the model follows"
+    return InvalidInput(f"{known}; expected more, such as mass.bbox and mass.bcr")
+
+
+def _known(value: Any) -> bool:
+    return any(map(_known, value)) if isinstance(value, list | tuple) else value is not None
 
 
 def row_log_density(network: Network, readings: Readings) -> Floats:

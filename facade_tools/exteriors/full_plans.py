@@ -49,10 +49,16 @@ def snapped_garage(house: tuple[Floats, Floats], part: Part) -> tuple[Floats, Fl
 
 
 def touching(house: tuple[Floats, Floats], part: Part, sign: int) -> Floats:
-    """Return py of porches, those that stand free moved to the wall; sign: −1 front, 1 back."""
-    edge = np.where(sign < 0, 0.0, 1.0)
-    limit = edge + sign * part.depth / house[1] / 2
-    return np.maximum(part.py, limit) if sign < 0 else np.minimum(part.py, limit)
+    """Return py of porches at the wall; sign: −1 front, 1 back.
+
+    Moved there are those that stand free, and those that are wholly inside: nobody would see them.
+    """
+    w, d = house
+    limit = np.where(sign < 0, 0.0, 1.0) + sign * part.depth / d / 2
+    free = (part.py - limit) * sign > 0
+    across = np.abs(part.px - 0.5) + part.width / w / 2 <= 0.5
+    along = np.abs(part.py - 0.5) + part.depth / d / 2 <= 0.5 - FLUSH / d
+    return np.where(free | (across & along), limit, part.py)
 
 
 def rectangle_exposure(house: tuple[Floats, Floats], part: Part) -> Floats:

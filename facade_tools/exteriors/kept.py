@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from ..artifacts.building import SIDES, Building, Element, Piece, Side
 from ..errors import Infeasible
 from ..geometry.blocked import wall_of
+from ..geometry.checks import element_rectangles, overlaps
 
 NEAR = 1e-3  # what is closer than this is in the same place (m)
 
@@ -27,7 +30,8 @@ def standing_sides(
     """Return all sides with the elements that are known.
 
     Known are all elements of `keep` (whose listed sides are closed: they were seen as a whole),
-    and those that `building` itself marks as known. Raises Infeasible where one has no wall.
+    and those that `building` itself marks as known; of one that both have, that of `keep`. Raises
+    Infeasible where one has no wall, two overlap, or two are main doors.
     """
     sources = [building] if keep is None else [building, keep]
     closed = () if keep is None else tuple(keep.facades)
@@ -39,7 +43,27 @@ def standing_sides(
         placed = tuple(replace(piece, elements=tuple(own[piece.id])) for piece in pieces[side])
         full = frozenset(piece.id for piece in placed) if side in closed else frozenset()
         sides.append(Standing(side, placed, full))
+    _refuse_contradictions(sides)
     return sides
+
+
+def _refuse_contradictions(sides: Sequence[Standing]) -> None:
+    """Raise Infeasible where two known elements overlap, or there are two main doors."""
+    mains = []
+    for side in sides:
+        for piece in side.pieces:
+            rows = element_rectangles(piece.elements)
+            for i, j in np.argwhere(np.triu(overlaps(rows, rows), 1)).tolist():
+                some, other = _place(piece, i), _place(piece, j)
+                raise Infeasible(f"the known {some} and {other} overlap; keep one of them")
+            mains += [_place(piece, k) for k, e in enumerate(piece.elements) if e.main]
+    if len(mains) > 1:
+        raise Infeasible(f"the known {mains[0]} and {mains[1]} are both main doors; keep one")
+
+
+def _place(piece: Piece, k: int) -> str:
+    element = piece.elements[k]
+    return f"{element.kind} at {element.u:g}, {element.v:g} m of {piece.id!r}"
 
 
 def _adopt(
@@ -57,8 +81,15 @@ def _adopt(
         for element in old.elements:
             if everything or element.known:
                 piece, moved = _home(side, old, element, pieces)
-                if moved not in own[piece.id]:
-                    own[piece.id].append(moved)
+                row = own[piece.id]
+                at = next((k for k, there in enumerate(row) if _same(there, moved)), len(row))
+                row[at : at + 1] = [moved]
+
+
+def _same(some: Element, other: Element) -> bool:
+    """Tell whether two elements are one that was read twice."""
+    apart = np.abs(element_rectangles([some]) - element_rectangles([other])).max()
+    return some.kind == other.kind and bool(apart <= NEAR)
 
 
 def _home(

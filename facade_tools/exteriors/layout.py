@@ -8,6 +8,7 @@ from functools import cached_property
 from .groups import BIT_GROUPS, GROUPS, BitGroup, Boundary, Coordinate, Group, declared
 
 VALUE = "value"  # the state of a coordinate that is at none of its atoms
+UNBOUNDED = 1e300  # the end of the range of a table's columns; those of buildings have a nearer one
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +58,14 @@ class Layout:
     groups: tuple[GroupLayout, ...]
     bit_groups: tuple[BitGroup, ...]
     boundary: Boundary = "x"
+
+    @cached_property
+    def is_table(self) -> bool:
+        """Tell whether this is over the columns of a table, which have no range: no buildings."""
+        if any(group.level != "table" or max(group.part, default=-1) >= 0 for group in self.groups):
+            return False
+        ends = [c.most for group in self.groups for c in group.coordinates]
+        return bool(ends) and min(ends) >= UNBOUNDED
 
     @cached_property
     def bits(self) -> tuple[str, ...]:

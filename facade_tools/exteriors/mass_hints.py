@@ -34,8 +34,9 @@ def search_target(
     complete = keep.complete if keep else ()
     if "garage" in complete or "mass" in complete:
         values[GARAGE_AT:PORCH_AT] *= target.weights[GARAGE_AT:PORCH_AT] > 0
-    extra = 0 if "mass" in complete else target.extra
-    return target._replace(values=values, extra=extra, zones=observed_zones(keep))
+    if "mass" in complete:
+        target = target._replace(extra=0, tower=False)
+    return target._replace(values=values, zones=observed_zones(keep))
 
 
 def observed_zones(keep: Building | None) -> Rectangles:

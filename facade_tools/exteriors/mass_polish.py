@@ -34,6 +34,7 @@ LONGEST_MOVE = 1.0  # of a line in one step (m)
 ROUNDS = 25
 SOLVED = 1e-18
 LEAST_HEIGHT = 1.8  # of a porch (m)
+OVER_KEPT = 0.01  # by which a new box may be higher than a kept one that it overlaps (m)
 MOST_VARIABLES = 5 * CAPACITY
 
 
@@ -112,8 +113,28 @@ def _in_zone(row: Floats, zones: Rectangles) -> bool:
 
 
 @compiled
+def _swallows(layout: Layout, k: int) -> bool:
+    """Tell whether box k hides a kept one: over it, over half of its plan, or over a porch."""
+    for j in range(CAPACITY):
+        if layout.kinds[j] == EMPTY or layout.locks[j] & PLAN_LOCKED == 0:
+            continue
+        x0, y0, x1, y1, height = layout.rows[j]
+        x = min(layout.rows[k, 2], x1) - max(layout.rows[k, 0], x0)
+        y = min(layout.rows[k, 3], y1) - max(layout.rows[k, 1], y0)
+        if min(x, y) <= TOLERANCE:
+            continue
+        higher = layout.rows[k, 4] > height + OVER_KEPT
+        if layout.kinds[j] == PORCH or higher or x * y > 0.5 * (x1 - x0) * (y1 - y0):
+            return True
+    return False
+
+
+@compiled
 def valid(layout: Layout, target: Target) -> bool:
-    """Tell whether all boxes are thick, high and out of the target's zones, one a general one."""
+    """Tell whether all boxes are thick, high and out of the target's zones, one a general one.
+
+    None hides a kept one.
+    """
     for k in range(CAPACITY):
         if layout.kinds[k] == EMPTY:
             continue
@@ -123,6 +144,8 @@ def valid(layout: Layout, target: Target) -> bool:
         if free_plan and min(x1 - x0, y1 - y0) < LEAST_THICKNESS:
             return False
         if free_plan and layout.kinds[k] != PORCH and _in_zone(layout.rows[k], target.zones):
+            return False
+        if free_plan and layout.kinds[k] != PORCH and _swallows(layout, k):
             return False
         if height < low and layout.locks[k] & HEIGHT_LOCKED == 0:
             return False

@@ -19,6 +19,7 @@ from .mass_energy import Target, layout_of, mass_energy, relative_residuals
 from .mass_hints import search_target
 from .mass_layout import EMPTY, GARAGE, GENERAL, Layout, move_to_origin
 from .mass_polish import round_layout
+from .mass_porches import settled_porches
 from .mass_roofs import (
     chimney_of,
     draw_roof_plan,
@@ -63,11 +64,14 @@ def generate_mass(
     """Yield buildings (boxes and roofs, no facades) whose mass attributes are those wanted.
 
     Unknown attributes leave the search free. keep: boxes that stay exactly as they are, with
-    what is `complete`; their unknown heights and roofs are filled in. candidates: how many, in
-    order of energy, mutually different (see `mass_candidates`). require: raises Infeasible where
-    the best energy is above it. model: attributes that `keep` contradicts are drawn from it anew,
-    given the others. `energy.residuals` names the groups that the result misses.
+    what is `complete`, and its storey height; their unknown heights and roofs are filled in.
+    candidates: how many, in order of energy, mutually different (see `mass_candidates`). require:
+    raises Infeasible where the best energy is above it, and in any case where there is no mass.
+    model: attributes that `keep` contradicts are drawn from it anew, given the others.
+    `energy.residuals` names the groups that the result misses.
     """
+    if keep is not None:
+        attributes = replace(attributes, storey_height=keep.storey_height)
     target = search_target(attributes, keep, rng=rng)
     masses = find_masses(target, keep, candidates, rng=rng)
     if model is not None and keep is not None and masses:
@@ -78,10 +82,11 @@ def generate_mass(
             attributes = suited
             target = search_target(attributes, keep, rng=rng)
             masses = find_masses(target, keep, candidates, rng=rng)
-    if require is not None and (not masses or masses[0].energy > require):
-        reached = f"{masses[0].energy:.3g}" if masses else "no layout"
-        raise Infeasible(f"mass energy {reached}; required at most {require:g}")
-    if masses and masses[0].energy > 1e-3:
+    if not masses:
+        raise Infeasible(f"no mass for {attributes.id!r}: what is known leaves no general box")
+    if require is not None and masses[0].energy > require:
+        raise Infeasible(f"mass energy {masses[0].energy:.3g}; required at most {require:g}")
+    if masses[0].energy > 1e-3:
         missed = ", ".join(relative_residuals(masses[0].shares, MET)) or "none"
         log.warning("%s: energy %.3g; not met: %s", attributes.id, masses[0].energy, missed)
     for number, mass in enumerate(masses, start=1):
@@ -112,7 +117,14 @@ def find_masses(
         # A height a hair above a storey's threshold must not be rounded below it.
         near = rounded.energy <= 1.5 * exact.energy + ROUNDING
         found.append(rounded if near else exact)
-    return diverse(found, count)
+    chosen = [_with_porches(mass, keep, target) for mass in diverse(found, count)]
+    return sorted(chosen, key=lambda mass: mass.energy)
+
+
+def _with_porches(mass: Mass, keep: Building | None, target: Target) -> Mass:
+    """Return a mass whose new porches can be seen and leave known elements free."""
+    boxes = settled_porches(mass.boxes, keep)
+    return mass if boxes == mass.boxes else Mass(boxes, *mass_energy(boxes, target), mass.curve)
 
 
 def _raise_low_walls(layout: Layout, storey_height: float) -> None:
@@ -184,7 +196,8 @@ def _finished(
     wanted = {part for part in ("chimney", "tower") if special.get(part) == 1}
     wanted |= set(keep.features) if keep else set()
     tower = "tower" in wanted and not any(b.roof and b.roof.style == "cone" for b in mass.boxes)
-    boxes = with_tower(mass.boxes, rng=rng) if tower else mass.boxes
+    added = tower and not (keep and "mass" in keep.complete)
+    boxes = with_tower(mass.boxes, rng=rng) if added else mass.boxes
     boxes = under_tower(boxes, _ids(keep), attributes.storey_height) if tower else boxes
     boxes = roofed(boxes, draw_roof_plan(attributes.element, rng=rng), tower=tower)
     chimneys = keep.chimneys if keep else ()

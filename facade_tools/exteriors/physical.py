@@ -42,11 +42,13 @@ class Columns:
 
 
 def no_second_floor(values: tuple[Floats, ...], layout: Layout) -> None:
-    """Mark r2 as absent where r1 is 0."""
+    """Mark r2 as absent where r1 is 0; what is that near to 0 is 0."""
     floors = Columns(values, layout).get("r1", "r2")
     if floors:
         r1, r2 = floors
-        r2[np.abs(r1) <= ATOM_TOLERANCE] = ABSENT
+        for share in floors:
+            share[np.abs(share) <= ATOM_TOLERANCE] = 0.0
+        r2[r1 == 0] = ABSENT
 
 
 def storey_heights(values: tuple[Floats, ...], layout: Layout, typical: float) -> Floats:
@@ -92,9 +94,9 @@ def settle(
     """Move complete rows, in place, to what is possible.
 
     Ranges; r2 only above an r1; the garage inside the bounding box and not higher; porches on
-    their side of the middle and outside the garage; at a full rectangle, exposures as places fix
-    them (`full_plans`). fixed (n, d) a group: 1 where a value is given
-    and must stay.
+    their side of the middle, outside the garage and open to one side; at a full rectangle,
+    exposures as places fix them (`full_plans`). fixed (n, d) a group: 1 where a value is given and
+    must stay.
     """
     _ranges(values, layout, fixed)
     no_second_floor(values, layout)
@@ -109,6 +111,7 @@ def settle(
             moved = np.minimum(place[0], limit) if sign < 0 else np.maximum(place[0], limit)
             _put(place[0], moved, held, f"{name}.py")
             _out_of_garage(columns, held, name, sign)
+            _open_side(columns, held, name)
             _settle_porch(columns, held, name, sign)
 
 
@@ -152,6 +155,16 @@ def _settle_porch(columns: Columns, held: Columns | None, name: str, sign: int) 
         (py, exposure) = columns.get(f"{name}.py", f"{name}.exposure") or (part.py, part.exposure)
         py[rows] = touching(house, part, sign)
         exposure[rows] = rectangle_exposure(house, part._replace(py=py[rows]))
+
+
+def _open_side(columns: Columns, held: Columns | None, name: str) -> None:
+    """Leave a porch as much exposure as its shorter side has: it opens to somewhere."""
+    found = columns.get(f"{name}.width", f"{name}.depth", f"{name}.exposure")
+    if found:
+        width, depth, exposure = found
+        with np.errstate(invalid="ignore"):  # absent parts are infinite and left alone
+            least = np.minimum(width, depth) / (2 * (width + depth))
+        _put(exposure, np.maximum(exposure, least), held, f"{name}.exposure")
 
 
 def _out_of_garage(columns: Columns, held: Columns | None, name: str, sign: int) -> None:

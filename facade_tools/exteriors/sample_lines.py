@@ -18,6 +18,7 @@ from .coordinates import columns_of
 from .drawing import Block, SampleOptions, Source, annotated, block_ids, source_of, taken_blocks
 from .physical import storey_heights
 from .row_bytes import Column, Row, joined, text_column
+from .table_samples import table_rows
 
 SLOT = "\x00"  # stands in a template where a row puts its own text; JSON escapes it
 MARK = dumps(SLOT).encode()
@@ -47,11 +48,16 @@ def sample_lines(
     options: SampleOptions,
     provenance: Provenance | None,
 ) -> Iterator[Lines]:
-    """Yield the lines of what `drawing.sample_attributes` yields, with a provenance."""
+    """Yield the lines of what `drawing.sample_attributes` yields, with a provenance.
+
+    The lines of a table's model are rows of CSV, which carry none.
+    """
     source = source_of(model, given, options)
     for first, block in taken_blocks(source, n, rng=rng):
         start, count = options.first + first, len(block.style)
-        if given is None:
+        if source.network.layout.is_table:
+            data = table_rows(source, block, first)
+        elif given is None:
             data = lines(source, block, first, provenance)
         else:
             rows = (replace(a, provenance=provenance) for a in annotated(source, block, first))

@@ -35,7 +35,7 @@ def draw_block(
 ) -> Draws:
     """Return one block of ancestral draws, moved onto what is possible; `style` fixes S.
 
-    shared: values that draws take up again.
+    Rows of a table stay where they are. shared: values that draws take up again.
     """
     styles = pick(np.tile(network.style, (BLOCK, 1)), rng)
     if style is not None:
@@ -45,7 +45,8 @@ def draw_block(
     values = tuple(v for v, _ in drawn)
     parts = tuple(p for _, p in drawn)
     take_up(values, shared, rng=rng)
-    settle(values, network.layout)
+    if not network.layout.is_table:
+        settle(values, network.layout)
     return Draws(Readings(("",) * BLOCK, values, parts, bits), styles)
 
 
@@ -66,7 +67,7 @@ def draw_bits(
     if known is not None:
         bits[:, known >= 0] = known[known >= 0]
     roofs = [i for i, name in enumerate(network.layout.bits) if name.startswith("roof.")]
-    if roofs:
+    if roofs and not network.layout.is_table:
         words = np.array(list(product((0, 1), repeat=len(roofs)))[1:], dtype=np.int8)
         if known is not None:
             seen = known[roofs]
@@ -92,7 +93,7 @@ def draw_groups(
             states[:, c] = pick(table[clusters], rng)
         x = draw_normal(family, clusters, shown, rng)
         values = values_of(own_units(x, group, network.scalings[g]), states, group)
-        if group.name == "arf" and "r1" in layout.features:
+        if group.name == "arf" and "r1" in layout.features and not layout.is_table:
             values[_flat(layout, shown)] = ABSENT
         show(shown, x, values, states, layout, g)
         out[g] = (values, _parts(states, group))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, cast
@@ -135,13 +137,17 @@ def network_of(model: Model) -> Network:
     """Return the model as arrays.
 
     Raises InvalidInput where it cannot be a model: probabilities that do not sum to 1, a
-    covariance that is not positive definite, shapes that disagree, edges in a cycle.
+    covariance that is not positive definite, shapes that disagree, edges in a cycle, names that
+    stand twice.
     """
     return _cached(ModelKey(model))
 
 
 def _network(model: Model) -> Network:
     layout = layout_of(model)
+    _unique([g.name for g in model.groups], "/groups")
+    _unique(layout.features, "/groups")
+    _training(model, layout)
     style = _probabilities(model.style, "/style")
     bits = [_unit(e.probabilities, f"/elements/{i}", len(style), len(e.bits))
             for i, e in enumerate(model.elements)]  # fmt: skip
@@ -168,24 +174,56 @@ def layout_of(model: Model) -> Layout:
     return Layout(groups, bits, cast("Any", model.boundary))
 
 
+def _unique(names: Sequence[str], pointer: str) -> None:
+    for name, count in Counter(names).items():
+        if count > 1:
+            raise InvalidInput(f"{name!r} stands twice; expected unique names", pointer=pointer)
+
+
+def _training(model: Model, layout: Layout) -> None:
+    """Raise InvalidInput where the training rows have another shape than the model."""
+    if model.training is None:
+        return
+    ids, rows = model.training.ids, model.training.values
+    if len(ids) != len(rows):
+        message = f"holds {len(rows)} rows; expected {len(ids)}, one an id"
+        raise InvalidInput(message, pointer="/training/values")
+    width = sum(len(group.coordinates) for group in layout.groups) + len(layout.bits)
+    for i, row in enumerate(rows):
+        if len(row) != width:
+            message = f"holds {len(row)} numbers; expected {width}"
+            raise InvalidInput(message, pointer=f"/training/values/{i}")
+
+
 def _group_layout(group: ModelGroup, pointer: str) -> GroupLayout:
     names = [c.name for c in group.coordinates]
+    _unique(names, f"{pointer}/coordinates")
+    _unique([c.coordinate for c in group.channels if c.coordinate], f"{pointer}/channels")
     channels = []
     for i, c in enumerate(group.channels):
         at = _index(names, c.coordinate, f"{pointer}/channels/{i}/coordinate")
-        channels.append(
-            Channel(c.name, c.states, at, group.coordinates[at].atoms if at >= 0 else ())
-        )
-    parts = [c.name for c in group.channels]
+        atoms = group.coordinates[at].atoms if at >= 0 else ()
+        count = len(atoms) + 1 if at >= 0 else 2  # a part is absent or present
+        if len(c.states) != count:
+            message = f"holds {len(c.states)} states; expected {count}"
+            raise InvalidInput(message, pointer=f"{pointer}/channels/{i}/states")
+        channels.append(Channel(c.name, c.states, at, atoms))
     coordinates = tuple(
         Coordinate(c.name, cast("Any", c.transform), c.floor, c.atoms, c.least, c.most)
         for c in group.coordinates
     )
     part = tuple(
-        _index(parts, c.part, f"{pointer}/coordinates/{i}/part")
+        _part(group, c.part, f"{pointer}/coordinates/{i}/part")
         for i, c in enumerate(group.coordinates)
     )
     return GroupLayout(group.name, group.level, coordinates, tuple(channels), part)
+
+
+def _part(group: ModelGroup, name: str | None, pointer: str) -> int:
+    """Return the channel of a part, −1 without."""
+    parts = [c.name for c in group.channels if c.coordinate is None]
+    _index(parts, name, pointer)
+    return _index([c.name for c in group.channels], name, pointer)
 
 
 def _index(names: list[str], name: str | None, pointer: str) -> int:
@@ -206,6 +244,9 @@ def _family(group: ModelGroup, index: int, layout: Layout, styles: int) -> Famil
         )
     hidden = _rows(group.hidden, f"{pointer}/hidden", styles)
     clusters = hidden.shape[1]
+    if group.direct and not np.array_equal(hidden, np.eye(styles)):
+        message = "is not the unit matrix; expected it of a group on S itself"
+        raise InvalidInput(message, pointer=f"{pointer}/hidden")
     tables = tuple(
         _rows(c.probabilities, f"{pointer}/channels/{i}/probabilities", clusters, len(c.states))
         for i, c in enumerate(group.channels)

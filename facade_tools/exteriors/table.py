@@ -3,163 +3,299 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping, Sequence
+import io
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, cast
+from math import inf, isfinite
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from ..artifacts.documents import parse_yaml
 from ..artifacts.model import Model
-from ..artifacts.store import unreadable
-from ..errors import InvalidInput
+from ..artifacts.store import RawItem
+from ..errors import InvalidInput, Place
 from .coordinates import Bits, Floats, Readings
-from .groups import BitGroup, Coordinate
-from .layout import GroupLayout, Layout, atom_channel, merged
+from .groups import ATOM_TOLERANCE, BitGroup, Coordinate
+from .layout import UNBOUNDED, GroupLayout, Layout, atom_channel, merged
 from .learning import LearnOptions, learn_readings
-from .transforms import TRANSFORMS
+from .table_groups import ID, ColumnGroup, Declaration, read_declaration
+from .transforms import EDGE, TRANSFORMS
 
-MAX_CELLS = 50_000_000
 LEAST_FLOOR = 0.01  # default least standard deviation, in standard deviations of the column
-KEYS = {"columns", "transform", "floor", "atoms"}
+
+Refuse = Callable[[InvalidInput], None]
 
 
 @dataclass(frozen=True, slots=True)
-class Declaration:
-    """groups.yaml.
+class Table:
+    """Rows with their ids and places, and columns (n,) by name, NaN where a cell is empty."""
 
-    `groups: {name: [columns] or {columns, transform, floor, atoms}}, bits: {name: [columns]}`.
-    """
+    ids: tuple[str, ...]
+    places: tuple[Place, ...]
+    columns: Mapping[str, Floats]
 
-    groups: Mapping[str, Mapping[str, Any]]
-    bits: Mapping[str, Sequence[str]]
+    def take(self, rows: Sequence[int]) -> Table:
+        """Return some of the rows."""
+        index = np.array(rows, dtype=np.int64)
+        columns = {name: column[index] for name, column in self.columns.items()}
+        ids, places = tuple(self.ids[i] for i in rows), tuple(self.places[i] for i in rows)
+        return Table(ids, places, columns)
+
+
+class Limit(NamedTuple):
+    """What the cells of a column may hold: numbers of a range, or one of some values."""
+
+    column: str
+    least: float
+    most: float
+    values: tuple[float, ...]
+    expected: str
+
+
+def stop(error: InvalidInput) -> None:
+    """Raise the error of a row: what is done with bad rows where nobody wants to skip them."""
+    raise error
 
 
 def learn_table(
-    paths: Sequence[str], groups: str, *, rng: np.random.Generator, options: LearnOptions
+    items: Sequence[RawItem],
+    groups: str,
+    *,
+    rng: np.random.Generator,
+    options: LearnOptions,
+    refuse: Refuse = stop,
 ) -> Model:
-    """Return the model of a table (CSV with a header; empty cells are unobserved)."""
+    """Return the model of a table (CSV with a header; empty cells are unobserved).
+
+    refuse: takes the errors of single rows; where it returns, the row is left out.
+    """
     declaration = read_declaration(groups)
-    ids, columns = read_table(paths)
-    layout, readings = table_readings(ids, columns, declaration)
+    table = read_table(items, refuse)
+    try:
+        limits = declared_limits(table, declaration)
+        layout, readings = table_readings(within(table, limits, refuse), declaration)
+    except InvalidInput as error:
+        raise error.at(groups) from None
     if options.variant == "gmm":
         layout, readings = merged(layout), _joined(readings)
-    return learn_readings(readings, layout, rng=rng, options=options)
-
-
-def read_declaration(path: str) -> Declaration:
-    """Return groups.yaml. Raises InvalidInput with the pointer of what is wrong."""
     try:
-        document = parse_yaml(Path(path).read_bytes())
-    except OSError as error:
-        raise unreadable(path, error) from None
+        return learn_readings(readings, layout, rng=rng, options=options)
     except InvalidInput as error:
-        raise error.at(path) from None
-    if not isinstance(document, dict) or set(document) - {"groups", "bits"}:
-        raise InvalidInput("expected an object with groups and bits", pointer="/").at(path)
-    groups, bits = document.get("groups") or {}, document.get("bits") or {}
-    if not isinstance(groups, dict) or not isinstance(bits, dict):
-        raise InvalidInput("expected names with lists of columns", pointer="/groups").at(path)
-    try:
-        return Declaration({n: _group(n, g) for n, g in groups.items()}, bits)
-    except InvalidInput as error:
-        raise error.at(path) from None
+        raise error.at(items[0].source) from None
 
 
-def _group(name: str, value: Any) -> Mapping[str, Any]:
-    row = {"columns": value} if isinstance(value, list) else value
-    pointer = f"/groups/{name}"
-    if not isinstance(row, dict) or set(row) - KEYS or not isinstance(row.get("columns"), list):
-        raise InvalidInput(f"expected columns, or an object of {sorted(KEYS)}", pointer=pointer)
-    if row.get("transform", "identity") not in TRANSFORMS:
-        raise InvalidInput(f"expected one of {sorted(TRANSFORMS)}", pointer=f"{pointer}/transform")
-    return row
+# --- the rows -----------------------------------------------------------------------------------
 
 
-def read_table(paths: Sequence[str]) -> tuple[tuple[str, ...], dict[str, Floats]]:
-    """Return row ids and columns (NaN where a cell is empty) of CSV files with the same header."""
+def read_table(
+    items: Sequence[RawItem], refuse: Refuse = stop, *, needed: Sequence[str] = ()
+) -> Table:
+    """Return the rows of CSV files with the same header; bad ones go to `refuse`.
+
+    Raises InvalidInput where the header lacks a column that is `needed`.
+    """
     ids: list[str] = []
     rows: list[list[float]] = []
+    places: list[Place] = []
+    seen: set[str] = set()
     header: list[str] | None = None
-    for path in paths:
-        try:
-            with Path(path).open(newline="", encoding="utf-8-sig") as file:
-                reader = csv.reader(file)
-                first = next(reader, None)
-                if first is None or (header is not None and first != header):
-                    raise InvalidInput("has no header, or another than the first file").at(path)
-                header = first
-                for line, cells in enumerate(reader, start=2):
-                    ids.append(_identity(cells, header, line))
-                    rows.append(_numbers(cells, header, path, line))
-        except OSError as error:
-            raise unreadable(path, error) from None
-    table = np.array(rows, dtype=np.float64).reshape(len(rows), len(header or []))
-    return tuple(ids), {name: table[:, i] for i, name in enumerate(header or [])}
+    for item in items:
+        lines = _lines(item)
+        _, first = next(lines, (1, None))
+        if first is None or (header is not None and first != header):
+            message = "has no header, or another than the first file"
+            raise InvalidInput(message).at(item.source)
+        header = _header(first, needed, item.source)
+        for count, (line, cells) in enumerate(lines, start=2):
+            try:
+                row = _numbers(cells, header)
+                ids.append(_identity(cells, header, seen) if ID in header else str(count))
+            except InvalidInput as error:
+                refuse(error.at(item.source, line))
+                continue
+            rows.append(row)
+            places.append(Place(item.source, line))
+    names = header or []
+    table = np.array(rows, dtype=np.float64).reshape(len(rows), len(names))
+    return Table(tuple(ids), tuple(places), {name: table[:, i] for i, name in enumerate(names)})
 
 
-def _identity(cells: list[str], header: list[str], line: int) -> str:
-    return cells[header.index("id")] if "id" in header and cells else str(line)
-
-
-def _numbers(cells: list[str], header: list[str], path: str, line: int) -> list[float]:
-    if len(cells) != len(header):
-        raise InvalidInput(f"{len(cells)} cells; expected {len(header)}").at(path, line)
+def _lines(item: RawItem) -> Iterator[tuple[int, list[str]]]:
+    """Yield the records of a file, each with the line on which it ends."""
     try:
-        return [
-            np.nan if name == "id" or not cell.strip() else float(cell)
-            for name, cell in zip(header, cells, strict=True)
-        ]
-    except ValueError as error:
-        raise InvalidInput(f"{error}; expected numbers").at(path, line) from None
+        reader = csv.reader(io.StringIO(item.data.decode("utf-8-sig"), newline=""))
+        for cells in reader:
+            yield reader.line_num, cells
+    except UnicodeDecodeError as error:
+        message = f"not UTF-8 text (byte {error.start}); expected a CSV table"
+        raise InvalidInput(message).at(item.source) from None
+    except csv.Error as error:
+        raise InvalidInput(f"no CSV: {error}").at(item.source, reader.line_num) from None
 
 
-def table_readings(
-    ids: tuple[str, ...], columns: Mapping[str, Floats], declaration: Declaration
-) -> tuple[Layout, Readings]:
-    """Return layout and readings of a table. Raises InvalidInput on a column that is not there."""
-    groups, values = [], []
-    for name, row in declaration.groups.items():
-        table = np.stack([_column(columns, c, name) for c in row["columns"]], axis=1)
-        groups.append(_layout(name, row, table))
-        values.append(table)
-    bit_groups = tuple(BitGroup(n, tuple(map(str, c))) for n, c in declaration.bits.items())
-    bits = [_bits(columns, str(c), n) for n, cs in declaration.bits.items() for c in cs]
-    layout = Layout(tuple(groups), bit_groups)
-    empty = np.empty((len(ids), 0), dtype=np.int8)
+def _header(cells: list[str], needed: Sequence[str], source: str) -> list[str]:
+    for name, count in Counter(cells).items():
+        if count > 1:
+            message = f"column {name!r} stands twice; expected unique names"
+            raise InvalidInput(message).at(source, 1)
+    for name in needed:
+        if name not in cells:
+            message = f"has no column {name!r}; expected {', '.join(needed)}"
+            raise InvalidInput(message).at(source, 1)
+    return cells
+
+
+def _identity(cells: list[str], header: list[str], seen: set[str]) -> str:
+    identity = cells[header.index(ID)]
+    if identity in seen:
+        raise InvalidInput(f"id {identity!r} stands twice; expected unique ids")
+    seen.add(identity)
+    return identity
+
+
+def _numbers(cells: list[str], header: list[str]) -> list[float]:
+    if len(cells) != len(header):
+        raise InvalidInput(f"{len(cells)} cells; expected {len(header)}")
+    return [_number(cell, name) for name, cell in zip(header, cells, strict=True)]
+
+
+def _number(cell: str, column: str) -> float:
+    if column == ID or not cell.strip():
+        return np.nan
+    try:
+        value = float(cell)
+    except ValueError:
+        value = np.nan
+    if not isfinite(value):
+        message = f"{cell[:40]!r} in column {column!r}; expected a finite number or an empty cell"
+        raise InvalidInput(message)
+    return value
+
+
+# --- what the cells may hold --------------------------------------------------------------------
+
+
+def declared_limits(table: Table, declaration: Declaration) -> list[Limit]:
+    """Return the limits of all columns. Raises InvalidInput on one that the table lacks."""
+    out = []
+    for group, row in declaration.groups.items():
+        for name in row.columns:
+            _present(table, name, f"/groups/{group}")
+            out.append(column_limit(name, row.transform, row.atoms))
+    for group, names in declaration.bits.items():
+        for name in names:
+            _present(table, name, f"/bits/{group}")
+            out.append(bit_limit(name))
+    return out
+
+
+def layout_limits(layout: Layout) -> list[Limit]:
+    """Return the limits of the columns that a model is over."""
+    coordinates = [c for group in layout.groups for c in group.coordinates]
+    numbers = [column_limit(c.name, c.transform, c.atoms) for c in coordinates]
+    return [*numbers, *map(bit_limit, columns_of(layout)[len(numbers) :])]
+
+
+def columns_of(layout: Layout) -> tuple[str, ...]:
+    """Return the columns that a layout is over: numbers in the order of its groups, then bits."""
+    numbers = [c.name for group in layout.groups for c in group.coordinates]
+    return (*numbers, *(bit for group in layout.bit_groups for bit in group.bits))
+
+
+def column_limit(name: str, transform: str, atoms: tuple[float, ...]) -> Limit:
+    """Return the interval of a transform: outside it values would count as its nearest end."""
+    least, most = TRANSFORMS[transform].lowest, TRANSFORMS[transform].highest
+    least = least - EDGE if transform == "log-above-1" else least  # it is defined at 1 itself
+    also = f" or one of {list(atoms)}" if atoms else ""
+    expected = f"expected {least:g} to {most:.7g} ({transform}){also}; perhaps in another unit"
+    return Limit(name, least, most, atoms, expected)
+
+
+def bit_limit(name: str) -> Limit:
+    """Return what a column of bits may hold."""
+    return Limit(name, inf, -inf, (0.0, 1.0), "expected 0, 1 or an empty cell")
+
+
+def _present(table: Table, name: str, pointer: str) -> None:
+    if name not in table.columns:
+        raise InvalidInput(f"the table has no column {name!r}", pointer=pointer)
+
+
+def within(table: Table, limits: Sequence[Limit], refuse: Refuse = stop) -> Table:
+    """Return the rows that keep all limits; the others go to `refuse`."""
+    bad: dict[int, InvalidInput] = {}
+    for limit in limits:
+        column = table.columns[limit.column]
+        good = np.isnan(column) | ((column >= limit.least) & (column <= limit.most))
+        for value in limit.values:
+            good |= np.abs(column - value) <= (ATOM_TOLERANCE if limit.least < inf else 0.0)
+        for i in np.flatnonzero(~good).tolist():
+            message = f"{column[i]:g} in column {limit.column!r}; {limit.expected}"
+            bad.setdefault(i, InvalidInput(message, table.places[i]))
+    for i in sorted(bad):
+        refuse(bad[i])
+    return table.take([i for i in range(len(table.ids)) if i not in bad]) if bad else table
+
+
+# --- to readings --------------------------------------------------------------------------------
+
+
+def table_readings(table: Table, declaration: Declaration) -> tuple[Layout, Readings]:
+    """Return layout and readings of a table whose columns keep the declared limits."""
+    groups = tuple(
+        _layout(name, row, np.stack([table.columns[c] for c in row.columns], axis=1))
+        for name, row in declaration.groups.items()
+    )
+    bit_groups = tuple(BitGroup(name, columns) for name, columns in declaration.bits.items())
+    layout = Layout(groups, bit_groups)
+    repeated = [name for name, count in Counter(layout.features).items() if count > 1]
+    if repeated:
+        message = f"{repeated[0]!r} means two things; expected another name of a column"
+        raise InvalidInput(message, pointer="/groups")
+    return layout, readings_of(table, layout)
+
+
+def readings_of(table: Table, layout: Layout) -> Readings:
+    """Return the rows of a table as a layout of its columns sees them."""
+    count = len(table.ids)
+    empty = np.empty((count, 0), dtype=np.int8)
+    values = tuple(
+        np.stack([table.columns[c.name] for c in group.coordinates], axis=1)
+        for group in layout.groups
+    )
+    bits = [_bits(table.columns[bit]) for group in layout.bit_groups for bit in group.bits]
     table_bits = np.stack(bits, axis=1) if bits else empty
-    return layout, Readings(ids, tuple(values), tuple(empty for _ in values), table_bits)
+    return Readings(table.ids, values, tuple(empty for _ in values), table_bits)
 
 
-def _column(columns: Mapping[str, Floats], name: Any, group: str) -> Floats:
-    if str(name) not in columns:
-        raise InvalidInput(f"the table has no column {name!r}", pointer=f"/groups/{group}")
-    return columns[str(name)]
-
-
-def _layout(name: str, row: Mapping[str, Any], table: Floats) -> GroupLayout:
-    spread = np.nan_to_num(np.nanstd(np.where(np.isfinite(table), table, np.nan), axis=0))
-    atoms = tuple(map(float, row.get("atoms", ())))
+def _layout(name: str, row: ColumnGroup, table: Floats) -> GroupLayout:
+    spread = _spread(table)
     coordinates = tuple(
         Coordinate(
-            str(column),
-            cast("Any", row.get("transform", "identity")),
-            float(row.get("floor", max(LEAST_FLOOR * spread[i], 1e-9))),
-            atoms,
-            -1e300,
-            1e300,
+            column,
+            cast("Any", row.transform),
+            float(row.floor or max(LEAST_FLOOR * spread[i], 1e-9)),
+            row.atoms,
+            -UNBOUNDED,
+            UNBOUNDED,
         )
-        for i, column in enumerate(row["columns"])
+        for i, column in enumerate(row.columns)
     )
-    channels = tuple(atom_channel(c, i) for i, c in enumerate(coordinates) if atoms)
+    channels = tuple(atom_channel(c, i) for i, c in enumerate(coordinates) if row.atoms)
     return GroupLayout(name, "table", coordinates, channels, (-1,) * len(coordinates))
 
 
-def _bits(columns: Mapping[str, Floats], name: str, group: str) -> Bits:
-    column = _column(columns, name, group)
-    if not np.isin(column[~np.isnan(column)], (0.0, 1.0)).all():
-        raise InvalidInput(f"column {name!r} holds more than 0 and 1", pointer=f"/bits/{group}")
+def _spread(table: Floats) -> Floats:
+    """Return the standard deviations (d,) of what is observed, 0 where nothing is."""
+    seen = ~np.isnan(table).all(axis=0)
+    spread = np.zeros(table.shape[1])
+    if seen.any():
+        spread = np.nanstd(np.where(seen, table, 0.0), axis=0)
+    return spread
+
+
+def _bits(column: Floats) -> Bits:
     return np.where(np.isnan(column), -1, column).astype(np.int8)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -16,6 +17,9 @@ from ..geometry.scenes import bounds, moved, shifts
 from . import cityjson, gltf, obj
 from .cityjson import CityModel
 
+log = logging.getLogger("facade_tools.export")
+
+FAR = 10_000.0  # m from the origin; beyond it 32-bit floats round to more than a millimetre
 ENDINGS = {"glb": ".glb", "obj": ".obj", "cityjson": ".city.json"}
 
 Part = TypeVar("Part", Scene, CityModel)
@@ -41,8 +45,13 @@ def placed(parts: Sequence[Part], arrange: str, frames: Sequence[Frame | None] =
     """Return the parts where they shall stand in one file.
 
     arrange: `own` leaves them; `auto` puts them back on the map where each has a frame (see
-    `mapped`), else shifts them apart if any two overlap; `side-by-side` always does.
+    `mapped`), else shifts them apart if any two overlap; `side-by-side` always does. Scenes that
+    then stand over 10 km from the origin are moved to it, all by one step, with a warning.
     """
+    return _near(_arranged(parts, arrange, frames))
+
+
+def _arranged(parts: Sequence[Part], arrange: str, frames: Sequence[Frame | None]) -> list[Part]:
     if arrange == "own":
         return list(parts)
     known = [frame for frame in frames if frame is not None]
@@ -50,6 +59,21 @@ def placed(parts: Sequence[Part], arrange: str, frames: Sequence[Frame | None] =
         return mapped(parts, known)
     steps = shifts([_bounds(part) for part in parts], always=arrange != "auto")
     return [_moved(part, np.eye(3), step) for part, step in zip(parts, steps, strict=True)]
+
+
+def _near(parts: list[Part]) -> list[Part]:
+    """Return scenes relative to the first one's low corner where 32-bit floats would round them."""
+    boxes = np.array([_bounds(part) for part in parts if isinstance(part, Scene)])
+    if np.abs(boxes).max(initial=0.0) <= FAR:
+        return parts
+    origin = np.floor(boxes[0, 0]) * (np.abs(boxes[0, 0]) > FAR)  # heights mostly stay
+    if np.abs(boxes - origin).max() > FAR:
+        log.warning("models over 10 km apart: 32-bit floats round them; try side-by-side")
+    if origin.any():
+        place = ", ".join(f"{value:.0f}" for value in origin)
+        name = parts[0].name
+        log.warning("%s: too far from 0 for 32-bit floats; the model's origin is %s", name, place)
+    return [_moved(part, np.eye(3), -origin) for part in parts]
 
 
 def _is_map(frames: Sequence[Frame]) -> bool:

@@ -38,9 +38,10 @@ class Item:
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """The artifacts of one item, encoded, with the rules that were applied, counted."""
+    """The artifacts of one item, encoded, and where it stands; the rules applied, counted."""
 
     rows: tuple[tuple[str, bytes], ...]
+    place: Place
     kinds: Counter[str] = field(default_factory=Counter)
     notes: Counter[str] = field(default_factory=Counter)
 
@@ -141,7 +142,8 @@ class Importer:
             raise InvalidInput(error.message, place) from None
         provenance = Provenance("import", None, self.recorded, (item.source,))
         rows = [(a.id, dump_line(encode(replace(a, provenance=provenance)))) for a in artifacts]
-        return Written(tuple(rows), Counter(a.kind for a in artifacts), built.notes)
+        place = Place(item.source.name, record.line, record.pointer)
+        return Written(tuple(rows), place, Counter(a.kind for a in artifacts), built.notes)
 
     def _asked(self, artifact: Imported) -> Any:
         """Return what --as asks for; raises InvalidInput where the source does not give it."""

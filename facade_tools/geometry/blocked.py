@@ -5,15 +5,20 @@ All rectangles lie in a facade piece's frame: u to the right as seen from outsid
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
+import shapely
 
 from ..artifacts.building import Box, Building, Piece, Side
 from .arrays import Floats, Points2, Rectangles
 from .boxes import box_rectangles
 from .floors import mass_boxes
+from .polygons import shape_of
+from .roofs_patch import Plane
+from .roofs_union import union_patches
 
 POST_SPACING = 3.6  # longest free span between two posts of a porch (m)
 POST_INSET = 0.1  # from the porch's edge to the middle of a post (m)
@@ -22,6 +27,8 @@ STRIP = 0.25  # a sloping roof line is covered by strips of at most this width (
 OUTSIDE = 0.02  # how far in front of the wall the roofs are cut (m)
 UNDER = 0.12  # thickness of a roof below its eaves (m)
 OVER = 0.05  # air above a roof (m)
+SLAB = 0.15  # thickness of the slab on a roof that runs into the wall (m)
+BESIDE = 1e-3  # roofs are cut this far within a strip: at its ends a neighbour may begin (m)
 NEAR = 1e-6
 
 
@@ -52,12 +59,30 @@ def blocked_rectangles(building: Building, side: Side, piece: Piece) -> Rectangl
     """Return the parts (n, 4) of a piece where no element may be: u0, v0, u1, v1, metres.
 
     Roofs of other boxes that meet the wall (a sloping line as strips), porch roofs, and the wall
-    right behind a porch post. Rectangles may stick out of the piece, and overlap.
+    right behind a porch post. A roof that runs on into the wall's box counts as it is built.
+    Rectangles may stick out of the piece, and overlap.
     """
     wall = wall_of(side, piece)
     rows = [row for box in building.boxes for row in _roof_strips(box, wall, piece)]
+    rows += _buried_strips(mass_boxes(building), wall, piece, rows)
     porches = [box for box in building.boxes if box.kind == "porch"]
     rows += [row for porch in porches for row in _post_strips(building, porch, wall, piece)]
+    return np.array(rows, dtype=np.float64).reshape(-1, 4)
+
+
+def porch_strips(building: Building, porch: Box, side: Side, piece: Piece) -> Rectangles:
+    """Return the parts (n, 4) of a piece behind the posts and the roof of a porch: u0, v0, u1, v1.
+
+    >>> from facade_tools.artifacts.building import Roof
+    >>> house = Box("h", "general", 5, 4, 10, 8, 3)
+    >>> porch = Box("p", "porch", 5, -1, 4, 2, 2.5, Roof("flat"))
+    >>> wall = Piece("front-1", "h", (0, 0, 0), 10, 3)
+    >>> posts = porch_strips(Building("b", (house, porch)), porch, "front", wall)[-2:]
+    >>> posts.round(1).tolist()
+    [[5.5, 0.0, 5.7, 2.5], [6.8, 0.0, 7.0, 2.5]]
+    """
+    wall = wall_of(side, piece)
+    rows = [*_roof_strips(porch, wall, piece), *_post_strips(building, porch, wall, piece)]
     return np.array(rows, dtype=np.float64).reshape(-1, 4)
 
 
@@ -92,7 +117,10 @@ def _axis(box: Box) -> Floats:
 def _roof_strips(box: Box, wall: Wall, piece: Piece) -> Iterator[tuple[float, ...]]:
     """Yield the strips of a piece that the roof of `box` covers."""
     bottom, top = piece.origin[2], piece.origin[2] + piece.height
-    if box.roof is None or box.height is None or not bottom - 1.0 < box.height < top - NEAR:
+    if box.roof is None or box.height is None or box.height >= top - NEAR:
+        return
+    # A mass well below the wall reaches it with its roof only, which is cut as it is built.
+    if box.kind != "porch" and box.height <= bottom - 1.0:
         return
     if not _line_meets(box, wall, piece):
         return
@@ -106,6 +134,48 @@ def _roof_strips(box: Box, wall: Wall, piece: Piece) -> Iterator[tuple[float, ..
             high, low = float(np.nanmax(part)), min(float(np.nanmin(part)), box.height)
             if high + OVER > bottom and low - UNDER < top:
                 yield us[2 * k], low - UNDER - bottom, us[2 * k + 2], high + OVER - bottom
+
+
+def _buried_strips(
+    boxes: Sequence[Box], wall: Wall, piece: Piece, known: Sequence[tuple[float, ...]]
+) -> Iterator[tuple[float, ...]]:
+    """Yield strips of a piece, from its bottom, that lie inside the roofs of the mass.
+
+    Only those that stand out of the `known` ones: a roof's own rectangle tells nothing of where
+    it runs on into the wall as a ridge.
+    """
+    count = max(int(np.ceil(piece.width / STRIP)), 1)
+    edges = np.linspace(0.0, piece.width, count + 1)
+    beside = min(BESIDE, piece.width / count / 4)
+    cuts = np.stack([edges[:-1] + beside, (edges[:-1] + edges[1:]) / 2, edges[1:] - beside], 1)
+    at = np.array(wall.start) + OUTSIDE * np.array(wall.outwards)
+    points = at + cuts.reshape(-1, 1) * np.array(wall.along)
+    highs = built_height(tuple(boxes), points).reshape(-1, 3).max(axis=1) - piece.origin[2]
+    for left, right, high in zip(edges[:-1], edges[1:], highs.tolist(), strict=True):
+        if high > NEAR and not any(
+            u0 <= left + NEAR and right <= u1 + NEAR and v0 <= 0.0 and v1 >= high + OVER - BESIDE
+            for u0, v0, u1, v1 in known
+        ):
+            yield left, -UNDER, right, high + SLAB + OVER
+
+
+def built_height(boxes: tuple[Box, ...], points: Points2) -> Floats:
+    """Return the height (m) of the mass with its roofs over plan points (n, 2); −inf beside it."""
+    shapes, planes = _built_roof(boxes)
+    heights = np.full(len(points), -np.inf)
+    for shape, (a, b, c) in zip(shapes, planes, strict=True):
+        over = shapely.intersects_xy(shape, points[:, 0], points[:, 1])
+        np.maximum(heights, points @ np.array([a, b]) + c, out=heights, where=over)
+    return heights
+
+
+@lru_cache(maxsize=4)
+def _built_roof(boxes: tuple[Box, ...]) -> tuple[list[shapely.Polygon], list[Plane]]:
+    """Return the roof's planes and what they lie over: asked for once a piece, made once."""
+    patches = union_patches(boxes)
+    shapes = [shape_of(patch.rings) for patch in patches]
+    shapely.prepare(shapes)
+    return shapes, [patch.plane for patch in patches]
 
 
 def _line_meets(box: Box, wall: Wall, piece: Piece) -> bool:

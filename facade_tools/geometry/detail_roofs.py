@@ -7,7 +7,7 @@ shared with another roof face stay on their line, so that neighbours still meet 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -23,6 +23,7 @@ from .triangulate import newell_normal, triangulate_rings
 THICKNESS = 0.15  # vertical, metres
 RAKE = 0.75  # overhang of a gable's edge relative to that of the eaves
 PATTERN = "shingle"
+MOST_DROP = 0.5  # metres, or the overhang if that is more: what eaves hang down at most
 MITER = 4.0  # a corner moves at most this many overhangs
 
 Overhang = Callable[[str], float]  # metres, by the owner of a face
@@ -72,15 +73,20 @@ def _slabs(solid: Solid, overhang: Mapping[str, float]) -> Iterator[Slab]:
         if label.semantic != "roof":
             continue
         rings, lines = [], []
+        plane = _plane(solid.vertices[list(face[0])])
+        reach = overhang.get(label.owner, 0.0)
         for ring in face:
-            borders = list(_borders(solid, index, ring, neighbours, overhang.get(label.owner, 0.0)))
+            borders = [
+                _raised(border, plane, reach)
+                for border in _borders(solid, index, ring, neighbours, reach)
+            ]
             outline, exposed = grown(borders)
             ends = np.stack([outline, np.roll(outline, -1, axis=0)], axis=1)
             lines.append(ends[exposed])
             rings.append(outline)
         shape = shape_of([solid.vertices[list(ring)][:, :2] for ring in face])
         edges = shapely.MultiLineString(list(np.concatenate(lines)))
-        yield Slab(_plane(solid.vertices[list(face[0])]), shape, rings, edges)
+        yield Slab(plane, shape, rings, edges)
 
 
 class _Collected:
@@ -151,6 +157,16 @@ def _borders(
         exposed = _stands_on_wall(solid, neighbours.get((a, b), index), outward)
         rake = RAKE if abs(end[2] - start[2]) > 1e-3 * length else 1.0
         yield Border(start[:2], direction, overhang * rake if exposed else 0.0, exposed)
+
+
+def _raised(border: Border, plane: tuple[float, float, float], overhang: float) -> Border:
+    """Return a border that moves less far where its steep face would hang down before the wall.
+
+    It falls by the overhang, as a roof of 45 degrees, or by MOST_DROP; flatter roofs fall by less.
+    """
+    fall = -float(border.normal @ np.array(plane[:2])) * border.offset
+    most = max(MOST_DROP, overhang)
+    return border if fall <= most else replace(border, offset=border.offset * most / fall)
 
 
 def _stands_on_wall(solid: Solid, face: int, outward: Floats) -> bool:

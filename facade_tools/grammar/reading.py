@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from ..artifacts.parse import LABELS, Parse
+from ..errors import InvalidInput
 from ..imaging.image_io import Photo
 
 
@@ -48,6 +50,27 @@ class Method(Protocol):
     ) -> Reading:
         """Return the reading. Raises Infeasible where no derivation fits the picture."""
         ...
+
+
+def check_mask(mask: NDArray[np.bool_], shape: tuple[int, ...]) -> None:
+    """Raise InvalidInput unless a mask is as large as its picture: (height, width, ...)."""
+    if mask.shape != shape[:2]:
+        (height, width), (rows, columns) = mask.shape, shape[:2]
+        message = f"the mask has {width}×{height} pixels, the picture {columns}×{rows}"
+        raise InvalidInput(f"{message}; expected the same")
+
+
+def shrunk_mask(
+    mask: NDArray[np.bool_], shape: tuple[int, ...], working: tuple[int, ...]
+) -> NDArray[np.bool_]:
+    """Return a mask of a picture of `shape` at working size: true where it hides more than half.
+
+    Raises InvalidInput where the mask has another size than the picture.
+    """
+    check_mask(mask, shape)
+    area = cv2.resize(mask.astype(np.float32), working[1::-1], interpolation=cv2.INTER_AREA)
+    hidden: NDArray[np.bool_] = area > 0.5
+    return hidden
 
 
 def label_index() -> dict[str, int]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from ..artifacts.grammar import Grammar, Rule, Size
 from ..errors import InvalidInput
-from .expressions import parse, symbols
+from .expressions import Automaton, automaton, parse, symbols
 
 
 def check_grammar(grammar: Grammar) -> None:
@@ -18,6 +18,35 @@ def check_grammar(grammar: Grammar) -> None:
         if name in grammar.terminals:
             raise InvalidInput("is a terminal too", pointer=f"/rules/{name}")
         _check_rule(grammar, name, rule)
+    _check_ends(grammar)
+
+
+def _check_ends(grammar: Grammar) -> None:
+    """Raise InvalidInput where a rule that is used has no word that ends in terminals."""
+    machines = {name: automaton(parse(rule.into)) for name, rule in grammar.rules.items()}
+    ending = set(grammar.terminals)
+    grown = True
+    while grown:
+        found = {name for name, machine in machines.items() if _has_word(machine, ending)}
+        grown = not found <= ending
+        ending |= found
+    used = symbols_below(grammar, grammar.axiom)
+    endless = [name for name in grammar.rules if name in used - ending]
+    if endless:
+        message = f"{endless[0]} never ends: each of its words holds a rule that does not end"
+        raise InvalidInput(message, pointer=f"/rules/{endless[0]}/into")
+
+
+def _has_word(machine: Automaton, ending: set[str]) -> bool:
+    """Tell whether an automaton has a word of these symbols alone."""
+    reached = {state for state in machine.first if machine.symbols[state] in ending}
+    waiting = list(reached)
+    while waiting:
+        after = machine.follow[waiting.pop()]
+        new = {s for s in after if machine.symbols[s] in ending} - reached
+        reached |= new
+        waiting += new
+    return machine.empty or not reached.isdisjoint(machine.last)
 
 
 def _check_rule(grammar: Grammar, name: str, rule: Rule) -> None:

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..artifacts.grammar import Grammar, Node, Rule, Size
 from ..errors import Infeasible
+from .derivation import nodes
 from .expressions import Automaton, automaton, parse
+from .extents import needed_sizes
 from .rules import check_grammar
 
 TRIES = 24
+DRAWS = 60  # of a whole derivation, until all of its sizes lie within their bounds
+SLACK = 1.0  # pixels that a size may miss its bounds by
 MAX_PARTS = 400
 MAX_DEPTH = 40
 MAX_NODES = 200_000
@@ -31,16 +35,54 @@ def sample_derivation(
     """Return a random derivation of the axiom on a canvas; scopes are (x0, y0, x1, y1), y up.
 
     Shapes of one symbol that are derived `alike` share their parameters; sizes are drawn around
-    the typical ones and adapted so that they fill the scope (any set is a valid split).
-    Raises Infeasible where the grammar cannot end or no parts fit.
+    the typical ones and adapted so that they fill the scope. A derivation with a part that misses
+    its `min` or `max` by more than SLACK pixels is dropped and drawn again, now with regard to what
+    the parts of a part need. Raises Infeasible where the grammar does not end or nothing fits.
     """
     check_grammar(grammar)
-    return _Sampler(grammar, height, rng).node(grammar.axiom, (0.0, 0.0, width, height), 0)
+    scope = (0.0, 0.0, width, height)
+    problem = ""
+    for draw in range(DRAWS):
+        sampler = _Sampler(grammar, height, rng, strict=draw > 0)
+        try:
+            tree = sampler.node(grammar.axiom, scope, 0)
+        except _Unfit as error:
+            problem = str(error)
+            continue
+        breach = _breach(grammar, tree, height)
+        if breach is None:
+            return tree
+        problem = f"{breach} misses its min or max"
+    size = f"{width:g} × {height:g} pixels"
+    raise Infeasible(f"no facade of {size} keeps the grammar's sizes: {problem}")
+
+
+def _breach(grammar: Grammar, tree: Node, unit: float) -> str | None:
+    """Return the pointer to the size that a part of a derivation misses, None where none does."""
+    for node in nodes(tree):
+        if not node.children:
+            continue
+        axis = 0 if node.split == "right" else 1
+        sizes = grammar.rules[node.symbol].sizes
+        for part in node.children:
+            bound, length = sizes.get(part.symbol), part.scope[axis + 2] - part.scope[axis]
+            if bound and not bound.min * unit - SLACK <= length <= bound.max * unit + SLACK:
+                return f"/rules/{node.symbol}/sizes/{part.symbol}"
+    return None
+
+
+class _Unfit(Infeasible):
+    """A draw that came to a scope which no parts fill; another draw may not."""
 
 
 class _Sampler:
-    def __init__(self, grammar: Grammar, unit: float, rng: np.random.Generator) -> None:
-        self.grammar, self.unit, self.rng = grammar, unit, rng
+    """Draws one derivation; a `strict` one fits sizes into their bounds, and into what is below."""
+
+    def __init__(
+        self, grammar: Grammar, unit: float, rng: np.random.Generator, *, strict: bool
+    ) -> None:
+        self.grammar, self.unit, self.rng, self.strict = grammar, unit, rng, strict
+        self.sizes = needed_sizes(grammar) if strict else {}
         self.machines = {name: automaton(parse(r.into)) for name, r in grammar.rules.items()}
         self.words: dict[str, Word] = {}
         self.count = 0
@@ -49,7 +91,7 @@ class _Sampler:
         """Derive a shape and all below it."""
         self.count += 1
         if depth > MAX_DEPTH or self.count > MAX_NODES:
-            raise Infeasible(f"the derivation does not end ({symbol})")
+            raise Infeasible(f"the derivation does not end: {depth} levels down at {symbol!r}")
         rule = self.grammar.rules.get(symbol)
         if rule is None:
             return Node(symbol, scope, label=self.grammar.terminals[symbol])
@@ -69,10 +111,18 @@ class _Sampler:
         """Return a rule's parts, sizes as shares of the scope; drawn once for shapes alike."""
         leader = rule.like or symbol
         alike = self.grammar.rules[leader].derive == "alike"
+        own = self.sizes.get(symbol, rule.sizes)
+        sizes = [own.get(name, Size()) for name in self.machines[symbol].symbols]
+        share = length / self.unit
         if alike and leader in self.words:
-            return self.words[leader]
-        sizes = [rule.sizes.get(name, Size()) for name in self.machines[symbol].symbols]
-        word = random_word(self.machines[symbol], sizes, length / self.unit, rng=self.rng)
+            word = self.words[leader]
+            return _refitted(word, sizes, share, symbol) if self.strict else word
+        try:
+            word = random_word(
+                self.machines[symbol], sizes, share, rng=self.rng, bounded=self.strict
+            )
+        except Infeasible as error:
+            raise _Unfit(f"/rules/{symbol}: {error}") from None
         if alike:
             self.words[leader] = word
         return word
@@ -85,10 +135,12 @@ def random_word(
     *,
     rng: np.random.Generator,
     tries: int = TRIES,
+    bounded: bool = False,
 ) -> Word:
     """Return a random word whose natural sizes fill `length` well; sizes are given as shares.
 
-    Of several random words the one whose sizes need the least stretching is taken.
+    Of several random words the one whose sizes need the least stretching is taken. `bounded`: only
+    words whose bounds allow the length count, and sizes are stretched within their bounds.
     Raises Infeasible where none ends.
     """
     best: Word | None = None
@@ -98,12 +150,46 @@ def random_word(
         total = sum(natural)
         if not states or total <= 0:
             continue
+        if bounded:
+            fitted = _fitted([sizes[state] for state in states], natural, length)
+            stretch = abs(np.log(total / length))
+            if fitted is not None and stretch < least:
+                best, least = Word(tuple(states), fitted), stretch
+            continue
         stretch = abs(np.log(total / length)) + _violation(sizes, states, natural, length / total)
         if stretch < least:
             best, least = Word(tuple(states), tuple(n / total for n in natural)), stretch
     if best is None:
         raise Infeasible("no parts fill the scope of a rule")
     return best
+
+
+def _refitted(word: Word, sizes: list[Size], length: float, symbol: str) -> Word:
+    """Return a word that was drawn for another length, its sizes within their bounds again."""
+    fitted = _fitted([sizes[s] for s in word.states], [n * length for n in word.sizes], length)
+    if fitted is None:
+        raise _Unfit(f"/rules/{symbol}: no parts fill the scope of a rule")
+    return replace(word, sizes=fitted)
+
+
+def _fitted(sizes: list[Size], natural: list[float], length: float) -> tuple[float, ...] | None:
+    """Return natural sizes stretched alike, clipped to their bounds, as shares that fill `length`.
+
+    None where the bounds do not allow that length.
+    """
+    least, most = (np.array([getattr(s, end) for s in sizes]) for end in ("min", "max"))
+    if not least.sum() <= length <= most.sum():
+        return None
+    own = np.maximum(natural, 1e-9)
+    low, high = 0.0, 1.0
+    while np.clip(own * high, least, most).sum() < length and high < 1e12:
+        high *= 2
+    for _ in range(80):
+        middle = (low + high) / 2
+        short = np.clip(own * middle, least, most).sum() < length
+        low, high = (middle, high) if short else (low, middle)
+    shares = np.clip(own * high, least, most)
+    return tuple((shares / shares.sum()).tolist())
 
 
 def _violation(sizes: list[Size], states: list[int], natural: list[float], scale: float) -> float:

@@ -27,7 +27,7 @@ def header(data: bytes, name: str) -> Header:
     read = next((one for magic, one in _READERS if data.startswith(magic)), None)
     if read is None:
         raise InvalidInput(
-            "is no picture that can be read; expected JPEG, PNG, TIFF, BMP or WebP"
+            "is no picture that can be read; expected JPEG, PNG, TIFF, BMP, WebP or a still GIF"
         ).at(name)
     try:
         info = read(data)
@@ -71,8 +71,26 @@ def _jpeg(data: bytes) -> Header:
 
 
 def _gif(data: bytes) -> Header:
-    width, height = struct.unpack_from("<HH", data, 6)
-    return Header("GIF", width, height, max(1, data.count(b"\x21\xf9\x04")))
+    width, height, flags = struct.unpack_from("<HHB", data, 6)
+    at, frames = 13 + _gif_colours(flags), 0
+    while at < len(data) and data[at] != _GIF_END and frames < 2:
+        if data[at] == _GIF_IMAGE:
+            frames += 1
+            at += 11 + _gif_colours(data[at + 9])  # and the size of the codes
+        else:
+            at += 2
+        while at < len(data) and data[at]:  # blocks of data, each after its length
+            at += 1 + data[at]
+        at += 1
+    return Header("GIF", width, height, max(1, frames), complete=at < len(data))
+
+
+_GIF_IMAGE, _GIF_END = 0x2C, 0x3B
+
+
+def _gif_colours(flags: int) -> int:
+    """Return the bytes of a table of colours."""
+    return 3 << (flags & 7) + 1 if flags & 0x80 else 0
 
 
 def _bmp(data: bytes) -> Header:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..artifacts.store import digest, unreadable
 from ..errors import InvalidInput
-from .image_headers import header
+from .image_headers import Header, header
 from .sgi import decoded_sgi
 
 Picture = NDArray[np.uint8]  # (height, width, 3) RGB
@@ -58,7 +58,7 @@ def decoded(data: bytes, name: str) -> Picture:
     if info.frames > 1:
         raise InvalidInput("is animated or has several pages; expected one picture").at(name)
     if not info.complete:
-        raise InvalidInput(f"is a truncated {info.format}; expected a whole file").at(name)
+        raise _truncated(info).at(name)
     picture: NDArray[np.generic] | None
     if info.format == "SGI":
         found = decoded_sgi(data)
@@ -70,6 +70,10 @@ def decoded(data: bytes, name: str) -> Picture:
     if picture is None:
         raise InvalidInput(f"cannot be decoded as {info.format}").at(name)
     return _eight_bit_rgb(picture)
+
+
+def _truncated(info: Header) -> InvalidInput:
+    return InvalidInput(f"is a truncated {info.format}; expected a whole file")
 
 
 def _decode(data: bytes, flags: int) -> NDArray[np.generic] | None:
@@ -121,6 +125,8 @@ def read_label_picture(path: str) -> NDArray[np.uint8]:
     info = header(data, path)
     if info.width * info.height > MAX_PIXELS:
         raise InvalidInput(f"has {info.width}×{info.height} pixels; too large").at(path)
+    if not info.complete:
+        raise _truncated(info).at(path)
     with _quiet():
         picture = _decode(data, cv2.IMREAD_UNCHANGED)
     if picture is None or picture.dtype != np.uint8:

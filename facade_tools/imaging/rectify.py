@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,6 +26,7 @@ FOCALS = (0.35, 6.0)  # of the longer side: what a camera may have
 LEAST_CONFIDENCE = 0.35
 MOST_GROWTH = 3.0  # of a side
 LEAST_SIDE = 16  # pixels
+LARGEST_ENTRY = 1e12  # of a homography: products of three stay far from overflow
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,9 +55,10 @@ def from_corners(shape: tuple[int, ...], corners: Points) -> Rectification:
     """Return the rectification that makes four corners a rectangle, cropped to it.
 
     corners: (4, 2) pixels, top left, top right, bottom right, bottom left. Raises InvalidInput
-    on corners that are no convex quadrilateral in that order.
+    on corners that are no convex quadrilateral in that order, or that lie beside the picture.
     """
     _check_convex(corners)
+    _check_seen(shape, corners)
     lines = [_line(corners[i], corners[(i + 1) % 4]) for i in range(4)]
     across, down = np.cross(lines[0], lines[2]), np.cross(lines[1], lines[3])
     metric = _metric(shape, across, down)
@@ -76,7 +79,9 @@ def from_report(
     """Return the rectification of given numbers. Raises ValueError on what is none."""
     matrix = np.array(homography, np.float64)
     width, height = (int(side) for side in size)
-    if matrix.shape != (3, 3) or not np.isfinite(matrix).all() or abs(np.linalg.det(matrix)) == 0:
+    if matrix.shape != (3, 3) or not (np.abs(matrix) <= LARGEST_ENTRY).all():
+        raise ValueError("no homography")
+    if abs(np.linalg.det(matrix)) == 0:
         raise ValueError("no homography")
     if min(width, height) < 1 or max(width, height) > MAX_SIDE or width * height > MAX_PIXELS:
         raise ValueError("no size of a picture")
@@ -110,6 +115,14 @@ def _check_convex(corners: Points) -> None:
     if not np.isfinite(corners).all() or (turns <= 1e-6).any():
         message = "corners are no convex quadrilateral in the order top left, top right, "
         raise InvalidInput(message + "bottom right, bottom left")
+
+
+def _check_seen(shape: tuple[int, ...], corners: Points) -> None:
+    height, width = shape[:2]
+    whole = np.array([[0, 0], [width, 0], [width, height], [0, height]], np.float32)
+    area, _ = cv2.intersectConvexConvex(corners.astype(np.float32), whole)
+    if not area > 0:
+        raise InvalidInput(f"corners lie outside the picture ({width}×{height} pixels)")
 
 
 def _metric(shape: tuple[int, ...], across: Vector, down: Vector) -> Homography:

@@ -27,6 +27,8 @@ EDGE = 0.02  # metres that an element keeps from its piece's border and from the
 LEAST = 0.25  # metres, a smaller element is left out
 PLANE = 0.8  # metres off its wall at which an element still belongs to it
 MOST_TRIES = 60  # elements that may be dropped to meet the rules of buildings
+MOST_STOREYS = 1000
+MOST_PIECES = 200_000
 DORMER = 8.0  # m², a smaller volume on a roof is a dormer, no box
 
 
@@ -56,6 +58,7 @@ def derived_building(
     if not boxes:
         raise InvalidInput("no volume is wide and high enough for a box (0.6 m, 0.5 m)")
     storey = min(storey_height, round(1.99 * min(box.height or 0.0 for box in boxes), 4))
+    _check_storeys(boxes, storey)
     bare = Building(identity, boxes, {}, storey)
     sides = frozenset(known)
     placed = [p for leaf in derived.leaves for p in _placed(leaf, sides)]
@@ -64,6 +67,18 @@ def derived_building(
     if any(element.main for element in _elements(building)):
         return building
     return replace(building, partial=True, complete=("mass", "garage", "porch", "roof"))
+
+
+def _check_storeys(boxes: Sequence[Box], storey: float) -> None:
+    """Raise InvalidInput where the pieces of the storeys would fill the memory."""
+    heights = [box.height or 0.0 for box in boxes]
+    if not max(heights) <= MOST_STOREYS * storey:
+        message = f"{max(heights):g} m are more than {MOST_STOREYS} storeys of {storey:g} m"
+        raise InvalidInput(message, pointer="/storey_height")
+    pieces = round(sum(len(SIDES) * max(1.0, height / storey) for height in heights))
+    if pieces > MOST_PIECES:
+        message = f"{len(boxes)} boxes have some {pieces:,} pieces of wall; at most {MOST_PIECES:,}"
+        raise InvalidInput(message, pointer="/storey_height")
 
 
 # --- boxes ----------------------------------------------------------------------------------------

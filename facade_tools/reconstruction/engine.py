@@ -20,6 +20,7 @@ from .volumes import Volume, is_upright, prism_volume, roof_volume
 
 MAX_DEPTH = 60
 MAX_SHAPES = 200_000
+LARGEST, FARTHEST = 1e6, 1e8  # metres, of a scope and from the origin
 WALLS = ("wall", "roof", "chimney")  # labels of solid leaves that are a part of the mass
 
 
@@ -65,6 +66,9 @@ def default_lot(
         raise InvalidInput(error.message, pointer="/lot") from None
     if min(width, depth) <= 0:
         raise InvalidInput(f"{width:g} × {depth:g} m; expected lengths", pointer="/lot")
+    if max(width, depth) > LARGEST:
+        message = f"{width:g} × {depth:g} m; expected at most {LARGEST:g} m"
+        raise InvalidInput(message, pointer="/lot")
     w, d = width / 2, depth / 2
     return Lot([np.array([[-w, -d], [w, -d], [w, d], [-w, d]])])
 
@@ -139,6 +143,7 @@ class _Engine:
             why = f"{depth} levels" if depth > MAX_DEPTH else f"{self.shapes} shapes"
             message = f"the derivation does not end: {why} down at {shape.symbol!r}"
             raise InvalidInput(message, pointer=place)
+        _check_reach(shape, place)
         if shape.symbol not in self.rules:
             return self._leaf(shape)
         names = {**self.values, **shape.names(), "lot_height": self.lot_height}
@@ -214,6 +219,17 @@ class _Engine:
             self.volumes.append(prism_volume(shape))
         geometry = Geometry(tuple(map(tuple, faces.points.tolist())), faces.faces)
         return Node(shape.symbol, bounds, None, terminal.label, (), None, geometry)
+
+
+def _check_reach(shape: Shape, place: str) -> None:
+    """Raise InvalidInput on a scope that is larger or farther away than artifacts may hold."""
+    size, away = (float(np.abs(v).max()) for v in (shape.scope.size, shape.scope.origin))
+    if not size <= LARGEST:
+        message = f"{shape.symbol} has a size of {size:g} m; expected at most {LARGEST:g} m"
+        raise InvalidInput(message, pointer=place)
+    if not away <= FARTHEST:
+        message = f"{shape.symbol} lies {away:g} m away; expected at most {FARTHEST:g} m"
+        raise InvalidInput(message, pointer=place)
 
 
 def _kind(operation: Operation) -> str:

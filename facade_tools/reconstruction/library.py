@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
-from ..artifacts.documents import decode, parse_json, parse_yaml
+from ..artifacts.documents import check_finite, decode, parse_json, parse_yaml
 from ..artifacts.pointers import located
 from ..artifacts.shape_grammar import ShapeGrammar
 from ..artifacts.store import unreadable
@@ -44,6 +44,7 @@ def load(name: str) -> Loaded:
     json = name.lower().endswith(".json")
     try:
         document = parse_json(data) if json else parse_yaml(data)
+        check_finite(document)
         if isinstance(document, dict) and not json:
             document = {"schema": "facade-tools/shape-grammar/1", **document}
         grammar: ShapeGrammar = decode(document, "shape-grammar")

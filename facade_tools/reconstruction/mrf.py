@@ -16,7 +16,7 @@ from ..artifacts.grammar import Node
 from ..artifacts.parse import LABELS, Floor, ImageInfo, Parse, Region
 from ..errors import Infeasible
 from ..grammar.derivation import leaves, painted
-from ..grammar.reading import Method, Reading, ReadOptions, label_index
+from ..grammar.reading import Method, Reading, ReadOptions, label_index, shrunk_mask
 from ..imaging.image_io import Photo, fitted
 from . import storeys as floors_module
 from .dormers import with_dormers
@@ -97,8 +97,11 @@ def in_cells(photo: Photo, scale: Scale, mask: NDArray[np.bool_] | None = None) 
     """
     working = fitted(photo.pixels, ROWS, PIXELS)
     if min(working.shape[:2]) < LEAST_SIDE:
-        raise Infeasible(f"the picture is too small; expected at least {LEAST_SIDE} pixels a side")
-    evidence = window_evidence(working, _shrunk(mask, working.shape[:2]))
+        height, width = working.shape[:2]
+        size = f"{width}×{height} pixels at working size"
+        raise Infeasible(f"the picture is too small: {size}; expected {LEAST_SIDE} a side or more")
+    hidden = None if mask is None else shrunk_mask(mask, photo.pixels.shape, working.shape)
+    evidence = window_evidence(working, hidden)
     height = len(working)
     found, reach = segments(working, evidence.seen), max(2, int(REACH * height))
     rows = agreement(evidence.plane, profiles(evidence.plane)[1], 3.0, 0.5)
@@ -132,13 +135,6 @@ def _facade(
     plane = cv2.resize(evidence.plane, (m, n), interpolation=cv2.INTER_AREA).astype(np.float32)
     lines = np.interp(np.arange(n + 1) * height / n, np.arange(height + 1), colour)
     return Facade(picture, plane, lines, round(sky * n / height), round(storey * n / height))
-
-
-def _shrunk(mask: NDArray[np.bool_] | None, shape: tuple[int, ...]) -> NDArray[np.bool_] | None:
-    if mask is None:
-        return None
-    area = cv2.resize(mask.astype(np.float32), shape[::-1], interpolation=cv2.INTER_AREA)
-    return np.asarray(area > 0.5)
 
 
 @dataclass(frozen=True, slots=True)

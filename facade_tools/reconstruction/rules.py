@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import inf
 
 from ..artifacts.shape_grammar import Operation, ShapeGrammar
 from ..errors import InvalidInput
 from .expressions import names_in
 
 CUTS = ("split", "repeat", "mirror", "faces", "roof")
+STEEPEST = 88  # degrees of a roof
+WINDOW_STYLES = ("sash", "sliding", "casement", "bay", "fixed", "unknown")
 OTHERWISE = "otherwise"  # the condition of a rule that stands in where no other applies
 SCOPE_NAMES = (
     "width", "depth", "height", "area", "side", "index", "count", "z", "lot_height",
@@ -24,6 +27,7 @@ def check_shape_grammar(grammar: ShapeGrammar) -> None:
         if name in SCOPE_NAMES:
             pointer = f"/parameters/{name}"
             raise InvalidInput("names a measure of the scope; take another name", pointer=pointer)
+    _check_styles(grammar)
     names = {*grammar.parameters, *SCOPE_NAMES}
     known = defined | grammar.terminals.keys()
     for i, rule in enumerate(grammar.rules):
@@ -35,12 +39,20 @@ def check_shape_grammar(grammar: ShapeGrammar) -> None:
         for j, operation in enumerate(rule.do):
             place = f"{pointer}/do/{j}"
             _check_operation(operation, place)
+            _check_roof(operation, place)
             for symbol in symbols_of(operation):
                 if symbol not in known:
                     message = f"{symbol!r} is neither a rule nor a terminal"
                     raise InvalidInput(message, pointer=place)
             for amount in _amounts(operation):
                 _check_expression(amount, names, place)
+
+
+def _check_styles(grammar: ShapeGrammar) -> None:
+    for name, terminal in grammar.terminals.items():
+        if terminal.label == "window" and terminal.style not in ("", *WINDOW_STYLES):
+            message = f"{terminal.style!r} is no style of a window ({', '.join(WINDOW_STYLES)})"
+            raise InvalidInput(message, pointer=f"/terminals/{name}/style")
 
 
 def grammar_problems(grammar: ShapeGrammar) -> Iterator[tuple[str, str]]:
@@ -65,6 +77,16 @@ def _check_operation(operation: Operation, pointer: str) -> None:
         raise InvalidInput(f"needs {what}", pointer=f"{pointer}/into")
     if operation.repeat and operation.each is None:
         raise InvalidInput("repeat needs the size of a part", pointer=f"{pointer}/each")
+
+
+def _check_roof(operation: Operation, pointer: str) -> None:
+    """Raise InvalidInput on numbers that no roof has; what is drawn or computed is clipped."""
+    for name, most in (("pitch", STEEPEST), ("rise", inf)):
+        amounts = getattr(operation, name)
+        for amount in amounts if isinstance(amounts, tuple | list) else [amounts]:
+            if isinstance(amount, int | float) and not 0 <= amount <= most:
+                span = f"from 0 to {STEEPEST}°" if name == "pitch" else "of at least 0 m"
+                raise InvalidInput(f"{amount} is no {name} {span}", pointer=f"{pointer}/{name}")
 
 
 def symbols_of(operation: Operation) -> Iterator[str]:

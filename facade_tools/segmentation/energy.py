@@ -55,13 +55,18 @@ def field_of(probabilities: NDArray[np.float32], classes: Sequence[str], plan: P
 
     Raises InvalidInput where the grammar uses a label that the classifier does not know.
     """
-    for label in plan.labels:
-        if label not in classes:
-            known = ", ".join(classes)
-            raise InvalidInput(f"label {label!r} is unknown to the classifier ({known})")
+    check_labels(classes, plan)
     planes = probabilities[[classes.index(label) for label in plan.labels], ::-1]
     cost = -np.log(np.maximum(planes, np.float32(LEAST_PROBABILITY)).astype(np.float64))
     return _field(cost, {label: i for i, label in enumerate(plan.labels)})
+
+
+def check_labels(classes: Sequence[str], plan: Plan) -> None:
+    """Raise InvalidInput where a grammar uses labels that a classifier does not know."""
+    missing = ", ".join(label for label in plan.labels if label not in classes)
+    if missing:
+        message = f"the classifier knows {', '.join(classes)}"
+        raise InvalidInput(f"{message}; grammar {plan.grammar.id!r} needs {missing} too")
 
 
 def _field(cost: NDArray[np.float64], label: dict[str, int]) -> Field:

@@ -18,7 +18,7 @@ from ..grammar.library import DEFAULT
 from ..grammar.library import load as load_grammar
 from ..grammar.plan import Plan
 from ..grammar.plan import plan as make_plan
-from ..grammar.reading import Method, Reading, ReadOptions, label_index
+from ..grammar.reading import Method, Reading, ReadOptions, label_index, shrunk_mask
 from ..imaging.features_context import Probabilities
 from ..imaging.image_io import Photo
 from . import dp, walk
@@ -26,9 +26,11 @@ from .bare_roofs import Seen
 from .classifier import Classifier, default
 from .classifier import load as load_classifier
 from .deriving import Frame, floors_of, regions_of, with_confidence
-from .energy import field_of
+from .energy import check_labels, field_of
 from .finishing import finished
 
+PLAIN = "plain"  # the shipped grammar of the fewest labels
+PROBE = 32  # pixels a side
 IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -55,7 +57,29 @@ def forest_method(options: ReadOptions) -> Method:
     classifier = default() if options.classifier is None else load_classifier(options.classifier)
     name = "default" if options.classifier is None else Path(options.classifier).name
     plan = compiled_plan(options.grammar or DEFAULT)
+    _check_fit(classifier, plan, options)
     return partial(read_facade, Reader(classifier, plan, options.solver, name))
+
+
+def _check_fit(classifier: Classifier, plan: Plan, options: ReadOptions) -> None:
+    """Raise InvalidInput, before any picture, where classifier and grammar do not fit together.
+
+    A classifier from a file is asked about a small picture too: it may want other features.
+    """
+    place = options.classifier or options.grammar or DEFAULT
+    try:
+        for name in classifier.classes:
+            _index(name)
+        if options.classifier is not None:
+            classifier.probabilities(np.zeros((PROBE, PROBE, 3), np.uint8))
+    except InvalidInput as error:
+        raise error.at(place) from None
+    try:
+        check_labels(classifier.classes, plan)
+    except InvalidInput as error:
+        fits = set(compiled_plan(PLAIN).labels) <= set(classifier.classes)
+        hint = f"; --grammar {PLAIN} fits" if fits else ""
+        raise InvalidInput(error.message + hint).at(place) from None
 
 
 def compiled_plan(name: str) -> Plan:
@@ -143,11 +167,4 @@ def _hidden(
     """Return where an occluder hides the facade at working size: nowhere without a mask."""
     if mask is None:
         return np.zeros(working, np.bool_)
-    if mask.shape != shape:
-        raise InvalidInput(
-            f"the mask has {mask.shape[1]}×{mask.shape[0]} pixels, the picture other"
-        )
-    size = (working[1], working[0])
-    area = cv2.resize(mask.astype(np.float32), size, interpolation=cv2.INTER_AREA)
-    covered: NDArray[np.bool_] = area > 0.5
-    return covered
+    return shrunk_mask(mask, shape, working)

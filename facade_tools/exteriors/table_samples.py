@@ -1,0 +1,38 @@
+"""Samples of a table's model: lines of CSV, the columns of the table again."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from ..artifacts.numbers import canonical
+from .drawing import Block, Source, block_ids
+from .layout import Layout
+from .table import columns_of
+from .table_groups import ID
+
+
+def table_header(layout: Layout) -> bytes:
+    """Return the first line: id, the columns of all groups, the bits."""
+    return _written([(ID, *columns_of(layout))])
+
+
+def table_rows(source: Source, block: Block, first: int) -> bytes:
+    """Return a line for each row of a block, ids counted from `first`."""
+    return _written(_rows(source, block, first))
+
+
+def _rows(source: Source, block: Block, first: int) -> Iterator[tuple[Any, ...]]:
+    groups = [values.tolist() for values in block.readings.values]
+    bits = block.readings.bits.tolist()
+    for i, name in enumerate(block_ids(source, block, first)):
+        numbers = [number for group in groups for number in group[i]]
+        yield (name, *canonical(numbers), *bits[i])
+
+
+def _written(rows: Iterable[tuple[Any, ...]]) -> bytes:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue().encode()

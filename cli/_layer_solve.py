@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,37 +18,79 @@ from facade_tools.artifacts.numbers import dump_document, dump_line
 from facade_tools.artifacts.provenance import Provenance
 from facade_tools.artifacts.store import RawItem, read_raw
 from facade_tools.errors import InvalidInput, Place
+from facade_tools.layering.assets import MEDIA, MESH, check_asset, named_assets
 from facade_tools.layering.solve import solve_design, variations
 from facade_tools.randomness import item_generator
 
-from ._stream import open_sink
+from ._options import StreamOptions
+from ._stream import ItemResult, say_skipped, write_items
 
 MAX_SWEEP = 1000
 MAX_ASSET = 16 << 20
-MEDIA = {".obj": "model/obj", ".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg"}
+SHEETS = (".svg", ".png")
+Canvas = tuple[float | None, float | None]
 
 
-def run_layer_solve(path: str, output: str | None, seed: int, options: Mapping[str, Any]) -> None:
+@dataclass(frozen=True)
+class CanvasSolver:
+    """Makes the layouts of a design on one canvas, their assets and provenance included."""
+
+    design: Design
+    assets: Mapping[str, Any]
+    provenance: Provenance
+    options: Mapping[str, Any]
+    seed: int
+    sweep: bool = False
+    indented: bool = False
+    drawn: list[Layout] = field(default_factory=list)
+
+    def __call__(self, canvas: Canvas) -> ItemResult:
+        """Return the layouts, which are also added to `drawn`."""
+        dump = dump_document if self.indented else dump_line
+        rows = []
+        design = self.design
+        if self.sweep:
+            width, height = canvas[0] or design.canvas.width, canvas[1] or design.canvas.height
+            design = replace(design, id=f"{design.id}-{width:g}x{height:g}")
+        for found in _layouts(design, canvas, self.seed, self.options):
+            assets = _used(self.assets, found)
+            full = replace(found, assets=assets, provenance=self.provenance)
+            rows.append((full.id, dump(encode(full))))
+            self.drawn.append(full)
+        return ItemResult(tuple(rows), [])
+
+
+def run_layer_solve(path: str, stream: StreamOptions, options: Mapping[str, Any]) -> None:
     """Solve a design on every canvas that the options ask for, and write the layouts."""
     canvases = _canvases(options["width"], options["height"])
+    single = stream.output is not None and Path(stream.output).suffix == ".json"
+    if single and len(canvases) > 1:
+        raise click.UsageError(f"{stream.output}: several layouts; name a .jsonl file or a folder")
+    _check_sheet(options["sheet"])
     item = _only(path)
     drawn: list[Layout] = []
     try:
-        design: Design = item.artifact("design")
-        design = design if design.id else replace(design, id=_stem(path))
-        recorded = {k: v for k, v in options.items() if k != "sheet" and v not in (None, False)}
-        provenance = Provenance("layer-solve", seed, recorded, (item.provenance(),))
-        with open_sink(output) as write:
-            for layout in _layouts(design, canvases, seed, options):
-                full = replace(layout, assets=_assets(path, layout), provenance=provenance)
-                single = output is not None and Path(output).suffix == ".json"
-                document = encode(full)
-                write(full.id, dump_document(document) if single else dump_line(document))
-                drawn.append(full)
+        solver = _solver(path, item, stream.seed or 0, options)
+        solver = replace(solver, sweep=len(canvases) > 1, indented=single, drawn=drawn)
+        bad = write_items("layer-solve", solver, canvases, stream)
     except InvalidInput as error:
         raise _with_line(error, item) from None
-    if options["sheet"]:
+    if options["sheet"] and drawn:
         _write_sheet(str(options["sheet"]), drawn)
+    say_skipped(bad)
+
+
+def _solver(path: str, item: RawItem, seed: int, options: Mapping[str, Any]) -> CanvasSolver:
+    design: Design = item.artifact("design")
+    design = design if design.id else replace(design, id=_stem(path))
+    recorded = {k: v for k, v in options.items() if k != "sheet" and v not in (None, False)}
+    provenance = Provenance("layer-solve", seed, recorded, (item.provenance(),))
+    return CanvasSolver(design, _assets(path, design), provenance, options, seed)
+
+
+def _check_sheet(path: Any) -> None:
+    if path and Path(path).suffix.lower() not in SHEETS:
+        raise click.UsageError(f"--sheet {path}: expected a sheet that ends in .svg or .png")
 
 
 def _only(path: str) -> RawItem:
@@ -65,9 +107,6 @@ def _only(path: str) -> RawItem:
 
 def _stem(path: str) -> str:
     return "design" if path == "-" else Path(path).resolve().stem
-
-
-Canvas = tuple[float | None, float | None]
 
 
 def _canvases(width: Any, height: Any) -> list[Canvas]:
@@ -98,51 +137,57 @@ def _sweep(text: str | None, option: str) -> list[float | None]:
 
 
 def _layouts(
-    design: Design, canvases: list[Canvas], seed: int, options: Mapping[str, Any]
+    design: Design, canvas: Canvas, seed: int, options: Mapping[str, Any]
 ) -> Iterator[Layout]:
-    for width, height in canvases:
-        name = design.id
-        if len(canvases) > 1:
-            own = design.canvas
-            name += f"-{width or own.width:g}x{height or own.height:g}"
-        how: dict[str, Any] = {
-            "width": width,
-            "height": height,
-            "time_limit": options["time_limit"],
-        }
-        named = replace(design, id=name)
-        if not options["every"] and seed == 0:
-            yield solve_design(named, **how)
-            continue
-        found = variations(named, **how)
-        if options["every"]:
-            yield from found
-        else:
-            listed = list(found)
-            picked = int(item_generator(seed, "layer-solve", name).integers(len(listed)))
-            yield replace(listed[picked], id=name)
+    how: dict[str, Any] = {
+        "width": canvas[0],
+        "height": canvas[1],
+        "time_limit": options["time_limit"],
+    }
+    if not options["every"] and seed == 0:
+        yield solve_design(design, **how)
+        return
+    found = variations(design, **how)
+    if options["every"]:
+        yield from found
+    else:
+        listed = list(found)
+        picked = int(item_generator(seed, "layer-solve", design.id).integers(len(listed)))
+        yield replace(listed[picked], id=design.id)
 
 
-def _assets(path: str, layout: Layout) -> dict[str, Any]:
-    """Return the files that visible shapes name, so that the layout stands on its own."""
-    names = {n for s in layout.shapes if s.visible for n in (s.mesh, s.texture) if n}
+def _assets(path: str, design: Design) -> dict[str, Any]:
+    """Return the files that the design's shapes name, checked, so that layouts hold them."""
     folder = Path() if path == "-" else Path(path).parent
-    return {name: _asset(folder, name) for name in sorted(names)}
+    found: dict[str, Any] = {}
+    for pointer, name in named_assets(design):
+        if name in found:
+            continue
+        try:
+            found[name] = _asset(folder / name)
+        except InvalidInput as error:
+            raise InvalidInput(f"{name} {error.message}", pointer=pointer) from None
+    return found
 
 
-def _asset(folder: Path, name: str) -> dict[str, str]:
-    media = MEDIA.get(Path(name).suffix.lower())
-    if media is None:
-        raise InvalidInput(f"{name}: expected .obj, .png or .jpg", pointer="/shapes")
+def _asset(path: Path) -> dict[str, str]:
     try:
-        data = (folder / name).read_bytes()
+        with path.open("rb") as file:
+            data = file.read(MAX_ASSET + 1)
     except OSError as error:
-        raise InvalidInput(f"{name} cannot be read: {error.strerror}", pointer="/shapes") from None
+        raise InvalidInput(f"cannot be read: {error.strerror}") from None
     if len(data) > MAX_ASSET:
-        raise InvalidInput(f"{name} is larger than {MAX_ASSET >> 20} MiB", pointer="/shapes")
-    if media == "model/obj":
-        return {"media": media, "data": data.decode(errors="replace")}
-    return {"media": media, "data": base64.b64encode(data).decode()}
+        raise InvalidInput(f"is larger than {MAX_ASSET >> 20} MiB")
+    media = MEDIA[path.suffix.lower()]
+    check_asset(media, data)
+    text = data.decode(errors="replace") if media == MESH else base64.b64encode(data).decode()
+    return {"media": media, "data": text}
+
+
+def _used(assets: Mapping[str, Any], layout: Layout) -> dict[str, Any]:
+    """Return what visible shapes name, so that the layout stands on its own."""
+    names = {n for s in layout.shapes if s.visible for n in (s.mesh, s.texture) if n}
+    return {name: assets[name] for name in sorted(names)}
 
 
 def _with_line(error: InvalidInput, item: RawItem) -> InvalidInput:

@@ -114,6 +114,19 @@ def run_items(
     name: str, function: Callable[[Any], ItemResult], items: Iterable[Any], stream: StreamOptions
 ) -> None:
     """Write what `function` makes of each item; raises as `run_stream` does."""
+    say_skipped(write_items(name, function, items, stream))
+
+
+def say_skipped(bad: int) -> None:
+    """Raise InvalidInput at the end of a stream of which items were skipped."""
+    if bad:
+        raise InvalidInput(f"{bad} bad items were skipped")
+
+
+def write_items(
+    name: str, function: Callable[[Any], ItemResult], items: Iterable[Any], stream: StreamOptions
+) -> int:
+    """Write what `function` makes of each item; return how many were skipped."""
     outcomes = map_ordered(function, items, jobs=stream.jobs, scheduler=stream.scheduler)
     progress = Progress(name)
     bad = 0
@@ -133,8 +146,7 @@ def run_items(
                 bad += 1
             progress.advance()
         progress.close()
-    if bad:
-        raise InvalidInput(f"{bad} bad items were skipped")
+    return bad
 
 
 def _show_remote(traceback: str) -> None:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import logging
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import islice
 from math import inf
 from pathlib import Path
 
@@ -15,14 +16,21 @@ from facade_tools.artifacts.blocks import Blocks
 from facade_tools.artifacts.building import Building
 from facade_tools.artifacts.layout import Layout
 from facade_tools.artifacts.provenance import Provenance
-from facade_tools.artifacts.store import digest, read_raw
-from facade_tools.artifacts.writing import atomic_folder, write_bytes
-from facade_tools.errors import InvalidInput, OutputFailed
+from facade_tools.artifacts.store import RawItem, digest, read_raw
+from facade_tools.artifacts.writing import atomic_folder
+from facade_tools.errors import InvalidInput
 from facade_tools.formats.exporting import model_files
 from facade_tools.formats.mesh_reader import ENDINGS, read_textured
 from facade_tools.formats.style_folder import read_style, write_style
+from facade_tools.geometry.mesh import Scene
 from facade_tools.randomness import item_generator
-from facade_tools.stylization.bases import building_blocks, layout_blocks, mesh_blocks, with_ends
+from facade_tools.stylization.bases import (
+    blocks_problems,
+    building_blocks,
+    layout_blocks,
+    mesh_blocks,
+    with_ends,
+)
 from facade_tools.stylization.capture import capture_style
 from facade_tools.stylization.model import CaptureOptions
 from facade_tools.stylization.pitched import crowned
@@ -31,7 +39,9 @@ from facade_tools.stylization.retarget import retarget
 from facade_tools.stylization.structure import chosen_style
 from facade_tools.stylization.style import Style
 
-from ._report import Progress
+from ._export import write_files
+from ._items import each
+from ._options import StreamOptions
 from ._stream import file_name, is_folder
 
 log = logging.getLogger("facade_tools.capture_style")
@@ -70,39 +80,76 @@ def is_style(path: str) -> bool:
     return (Path(path) / "stylesheet.json").is_file()
 
 
-def run_retarget(
-    styles: Sequence[str],
-    bases: Sequence[str],
-    output: str,
-    resize: Sequence[str],
-    small: float,
-    seed: int,
-) -> None:
-    """Put styles onto all bases and write their models."""
-    sheets = [Style(*read_style(Path(folder))) for folder in styles]
-    sizes = dict(_size(text) for text in resize)
-    progress = Progress("retarget")
-    seen: set[str] = set()
-    for base, plain, building in _bases(bases):
-        blocks = resized(base, sizes) if sizes else base
-        rng = item_generator(seed, "retarget", base.id)
-        style = chosen_style([s.sheet.blocks for s in sheets], blocks.blocks, rng=rng)
-        chosen = sheets[style]
+@dataclass(frozen=True)
+class Dresser:
+    """Makes the model of a base in one of the styles."""
+
+    styles: Sequence[Style]
+    sizes: Mapping[str, tuple[float, float, float]]
+    small: float
+    seed: int
+
+    def __call__(self, source: Source) -> tuple[str, Scene]:
+        """Return the base's id and its scene; raises InvalidInput with its place."""
+        try:
+            return self.dressed(*_base(source))
+        except InvalidInput as error:
+            raise error.at(*_place(source)) from None
+
+    def dressed(self, base: Blocks, plain: bool, building: Building | None) -> tuple[str, Scene]:
+        """Return id and scene; plain: whether the base may be given a bottom and a top."""
+        for pointer, message in blocks_problems(base):
+            raise InvalidInput(message, pointer=pointer)
+        blocks = resized(base, self.sizes) if self.sizes else base
+        rng = item_generator(self.seed, "retarget", base.id)
+        chosen = self.styles[
+            chosen_style([s.sheet.blocks for s in self.styles], blocks.blocks, rng=rng)
+        ]
         if plain:
             blocks = with_ends(blocks, chosen.blocks)
-        scene = retarget(chosen, blocks, small)
-        if building is not None and not sizes:
+        roofed = building is not None and not self.sizes
+        scene = retarget(chosen, blocks, self.small, flush=roofed)
+        if building is not None and roofed:
             scene = crowned(scene, chosen, building)
-        if base.id in seen and is_folder(output):
-            raise InvalidInput(f"id {base.id!r} stands twice; expected unique ids in a folder")
-        if seen and not is_folder(output):
-            raise OutputFailed(f"{output}: several bases; name a folder")
-        seen.add(base.id)
-        stem, form, folder = _target(output, base.id)
-        for name, data in model_files([scene], stem, form).items():
-            write_bytes(folder / name, data)
-        progress.advance()
-    progress.close()
+        return base.id, scene
+
+
+def run_retarget(
+    styles: Sequence[str], stream: StreamOptions, resize: Sequence[str], small: float
+) -> None:
+    """Put styles onto all bases and write their models."""
+    output = str(stream.output)
+    sizes = dict(_size(text) for text in resize)
+    form = _form(output)
+    sources = _sources(stream.inputs)
+    if not is_folder(output):
+        sources = _single(sources, output)
+    sheets = [_style(Path(folder)) for folder in styles]
+    dresser = Dresser(sheets, sizes, small, stream.seed or 0)
+    seen: set[str] = set()
+    for identity, scene in each("retarget", dresser, stream, sources):
+        name = file_name(identity)
+        if name in seen:
+            raise InvalidInput(f"id {identity!r} stands twice; expected unique ids in a folder")
+        seen.add(name)
+        folder, stem = (
+            (Path(output), name) if is_folder(output) else (Path(output).parent, Path(output).stem)
+        )
+        write_files(folder, model_files([scene], stem, form))
+
+
+def _style(folder: Path) -> Style:
+    sheet, blocks, pictures = read_style(folder)
+    for pointer, message in blocks_problems(blocks):
+        raise InvalidInput(message, pointer=pointer).at(str(folder / "blocks.json"))
+    return Style(sheet, blocks, pictures)
+
+
+def _form(output: str) -> str:
+    form = "glb" if is_folder(output) else Path(output).suffix.lower().lstrip(".")
+    if form not in ("glb", "obj"):
+        raise click.UsageError(f"{output}: expected .glb, .obj or a folder")
+    return form
 
 
 def _size(text: str) -> tuple[str, tuple[float, float, float]]:
@@ -116,37 +163,52 @@ def _size(text: str) -> tuple[str, tuple[float, float, float]]:
     return match.group(1), (numbers[0], numbers[1], numbers[2])
 
 
-def _bases(paths: Sequence[str]) -> Iterator[tuple[Blocks, bool, Building | None]]:
-    """Yield every base, whether it may be given a bottom and a top, and the building it is of."""
+@dataclass(frozen=True)
+class MeshFile:
+    """A mesh as a base, and its id."""
+
+    path: Path
+    id: str
+
+
+Source = RawItem | MeshFile
+
+
+def _sources(paths: Sequence[str]) -> Iterator[Source]:
+    """Yield every base, unread; a mesh is named by its folder, or itself if others lie there."""
+    meshes = [Path(path) for path in paths if Path(path).suffix.lower() in ENDINGS]
+    folders = [path.parent.name for path in meshes]
     for path in paths:
-        if Path(path).suffix.lower() in ENDINGS:
-            yield (
-                mesh_blocks(read_textured(Path(path)), file_name(Path(path).parent.name)),
-                True,
-                None,
-            )
-            continue
-        for item in read_raw([path]):
-            artifact = item.artifact("blocks", "building", "layout")
-            if isinstance(artifact, Blocks):
-                yield artifact, False, None
-            elif isinstance(artifact, Layout):
-                yield layout_blocks(artifact), True, None
-            else:
-                yield building_blocks(artifact), True, artifact
+        mesh = Path(path)
+        if mesh not in meshes:
+            yield from read_raw([path])
+        elif folders.count(mesh.parent.name) > 1 or not mesh.parent.name:
+            yield MeshFile(mesh, file_name(mesh.stem))
+        else:
+            yield MeshFile(mesh, file_name(mesh.parent.name))
 
 
-def _target(output: str, identity: str) -> tuple[str, str, Path]:
-    """Return stem, format and folder of a base's model."""
-    if is_folder(output):
-        folder, name = Path(output), f"{file_name(identity)}.glb"
-    else:
-        folder, name = Path(output).parent, Path(output).name
-    form = Path(name).suffix.lower().lstrip(".")
-    if form not in ("glb", "obj"):
-        raise click.UsageError(f"{output}: expected .glb, .obj or a folder")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputFailed(f"{folder}: cannot be made: {error.strerror}") from error
-    return Path(name).stem, form, folder
+def _single(sources: Iterator[Source], output: str) -> Iterator[Source]:
+    """Return the sources; raises UsageError where there are several."""
+    first = list(islice(sources, 2))
+    if len(first) > 1:
+        raise click.UsageError(f"{output}: several bases; name a folder")
+    return iter(first)
+
+
+def _place(source: Source) -> tuple[str, int | None]:
+    if isinstance(source, MeshFile):
+        return str(source.path), None
+    return source.source, source.line
+
+
+def _base(source: Source) -> tuple[Blocks, bool, Building | None]:
+    """Return a base, whether it may be given a bottom and a top, and the building it is of."""
+    if isinstance(source, MeshFile):
+        return mesh_blocks(read_textured(source.path), source.id), True, None
+    artifact = source.artifact("blocks", "building", "layout")
+    if isinstance(artifact, Blocks):
+        return artifact, False, None
+    if isinstance(artifact, Layout):
+        return layout_blocks(artifact), True, None
+    return building_blocks(artifact), True, artifact

@@ -20,8 +20,10 @@ from ._stream import open_sink
 # Kind of artifact -> function that yields its problems.
 RULES = {
     "attributes": "facade_tools.exteriors.relations:contradictions",
+    "blocks": "facade_tools.stylization.bases:blocks_problems",
     "building": "facade_tools.geometry.checks:building_problems",
     "derivation": "facade_tools.reconstruction.records:derivation_problems",
+    "layout": "facade_tools.layering.assets:layout_problems",
     "shape-grammar": "facade_tools.reconstruction.rules:grammar_problems",
 }
 

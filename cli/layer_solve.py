@@ -30,16 +30,18 @@ from . import _options
 )
 @click.option("--all", "every", is_flag=True, help="Every variation: alternations, counters.")
 @click.option("--sheet", metavar="PICTURE", help="Contact sheet of all layouts, .svg or .png.")
-def command(design: str, output: str | None, seed: int, **options: object) -> None:
+@_options.on_error
+def command(design: str, output: str | None, seed: int, on_error: str, **options: object) -> None:
     """Solve a facade that is designed as a stack of layers (IMAW15).
 
     DESIGN is a .yaml or .json file, or - for standard input. The layout of least alignment error
     goes to PATH; several (a sweep, --all) are one a line. --seed other than 0 picks one of the
-    variations that --all lists.
+    variations that --all lists. Of a sweep --on-error skip leaves out the sizes without a layout.
 
     \b
     Example: facade layer-solve sample_data/designs/residential-9.yaml --width 8:16:4 -o out.jsonl
     """
     from ._layer_solve import run_layer_solve
 
-    run_layer_solve(design, output, seed, options)
+    stream = _options.StreamOptions((design,), output, seed, 1, None, on_error)
+    run_layer_solve(design, stream, options)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from ._options import FiniteRange, output, seed
+from ._options import FiniteRange, StreamOptions, on_error, output, seed
 
 
 @click.command()
@@ -33,6 +33,7 @@ from ._options import FiniteRange, output, seed
     "otherwise than in the source, takes the texture of a larger group; 0 never.",
 )
 @seed
+@on_error
 def command(
     style: str,
     bases: tuple[str, ...],
@@ -41,6 +42,7 @@ def command(
     resize: tuple[str, ...],
     reassign: float,
     seed: int,
+    on_error: str,
 ) -> None:
     """Put the look of a style sheet onto buildings of another structure (LNSW13).
 
@@ -60,4 +62,5 @@ def command(
     rest = [base for base in bases if base not in more]
     if not rest:
         raise click.UsageError("Missing argument 'BASE...'.")
-    run_retarget((style, *styles, *more), rest, output, resize, reassign, seed)
+    stream = StreamOptions(tuple(rest), output, seed, 1, None, on_error)
+    run_retarget((style, *styles, *more), stream, resize, reassign)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import struct
+import zlib
 from dataclasses import replace
 from pathlib import Path
 
@@ -180,9 +182,115 @@ def test_command_refuses(facade, tmp_path, old, new, code, expected):
     assert old in text
     path = tmp_path / "bad.yaml"
     path.write_text(text.replace(old, new))
+    (tmp_path / "column.obj").write_bytes(RESIDENTIAL.with_name("column.obj").read_bytes())
     done = facade("layer-solve", path)
     message = done.stderr.decode()
     assert done.returncode == code, message
     assert expected in message
     assert message.count("\n") == 1
     assert done.stdout == b""
+
+
+# --- assets, sweeps, sheets -----------------------------------------------------------------------
+TILES = """\
+canvas: {width: 6, height: 3}
+symbols: {A: {size: 1.0}, P: {size: 1.5}}
+counters: {k: auto}
+patterns: {X: "A^k", Y: "P^k"}
+layers: [{name: base, x: X, y: Y, shapes: {}}]
+"""
+
+
+def png(width, height, data=b"\0\0"):
+    chunks = [
+        (b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)),
+        (b"IDAT", zlib.compress(data)),
+        (b"IEND", b""),
+    ]
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+        for kind, body in chunks
+    )
+
+
+@pytest.mark.parametrize(
+    ("shapes", "data", "expected"),
+    [
+        ("shapes: {AP: {mesh: a.obj}}", b"hello\n", ":6: /shapes/AP/mesh: a.obj has no faces"),
+        ("shapes: {AP: {mesh: a.obj}}", b"v 0 0 0\nv nan 0 1\nf 1 2 1\n", "a.obj OBJ line 2 is"),
+        ("shapes: {AP: {mesh: a.obj}}", b"v 0 0 0\nv 1 0\nf 1 2 1\n", "a.obj OBJ line 2 is"),
+        ("shapes: {AP: {mesh: a.png}}", png(1, 1), "/shapes/AP/mesh: a.png: expected .obj"),
+        ("shapes: {AP: {mesh: a.obj}}", None, "/shapes/AP/mesh: a.obj cannot be read"),
+        ("shapes: {AP: {texture: a.png}}", b"bad\n", "/shapes/AP/texture: a.png is no picture"),
+        ("shapes: {A*: {texture: a.png}}", png(30000, 30000), "/A*/texture: a.png has 30000×30000"),
+        ("layers/0", b"hello\n", ":5: /layers/0/shapes/AP/mesh: a.obj has no faces"),
+    ],
+)
+def test_assets_are_checked_before_anything_is_solved(
+    facade_here, monkeypatch, tmp_path, shapes, data, expected
+):
+    monkeypatch.setattr("facade_tools.layering.solve.prepare", lambda: pytest.fail("solved"))
+    text = TILES + shapes + "\n"
+    if shapes == "layers/0":
+        text = TILES.replace("shapes: {}", "shapes: {AP: {mesh: a.obj}}")
+    (tmp_path / "d.yaml").write_text(text)
+    if data is not None:
+        (tmp_path / ("a.png" if "a.png" in shapes else "a.obj")).write_bytes(data)
+    done = facade_here("layer-solve", tmp_path / "d.yaml", "-o", tmp_path / "out.json")
+    assert done.returncode == 3, done.stderr
+    assert expected in done.stderr.decode()
+    assert not (tmp_path / "out.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("look", "media", "data"),
+    [
+        ("mesh", "model/obj", "hello"),
+        ("mesh", "model/obj", "v 0 0 0\nv inf 0 1\nf 1 2 1"),
+        ("texture", "image/png", "YmFkCg=="),
+        ("texture", "image/png", "no base64"),
+    ],
+)
+def test_assets_of_a_layout_are_checked_on_the_way_out(facade_here, tmp_path, look, media, data):
+    shapes = (replace(solve_design(design()).shapes[0], visible=True, **{look: "a/b"}),)
+    layout = replace(solve_design(design()), shapes=shapes)
+    layout = replace(layout, assets={"a/b": {"media": media, "data": data}})
+    (tmp_path / "l.json").write_bytes(dump_document(encode(layout)))
+    for command in (("export", "-o", tmp_path / "l.glb"), ("validate",)):
+        done = facade_here(command[0], tmp_path / "l.json", *command[1:])
+        assert done.returncode == 3, done.stderr
+        assert b"/assets/a~1b/data" in done.stderr + done.stdout
+
+
+def test_a_sweep_leaves_out_what_has_no_layout_if_asked(facade_here, tmp_path):
+    (tmp_path / "d.yaml").write_text(TILES)
+    sweep = ("layer-solve", tmp_path / "d.yaml", "--width", "0.2:4.2:1", "-o", tmp_path / "o.jsonl")
+    sheet = tmp_path / "sheet.svg"
+    assert facade_here(*sweep, "--sheet", sheet).returncode == 4
+    assert not (tmp_path / "o.jsonl").exists()
+    done = facade_here(*sweep, "--sheet", sheet, "--on-error", "skip")
+    assert done.returncode == 3
+    assert [line.split(b":")[2] for line in done.stderr.splitlines()] == [
+        b" x (0.2 m)", b" 1 bad items were skipped",
+    ]  # fmt: skip
+    widths = [json.loads(line)["id"] for line in (tmp_path / "o.jsonl").read_bytes().splitlines()]
+    assert widths == [f"d-{width}.2x3" for width in (1, 2, 3, 4)]
+    assert sheet.exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("--sheet", "s.gif"), "--sheet s.gif: expected"),
+        (("--width", "2:4:1", "-o", "sweep.json"), "sweep.json: several layouts"),
+    ],
+)
+def test_outputs_that_cannot_be_are_refused_first(
+    facade_here, monkeypatch, tmp_path, words, expected
+):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("facade_tools.layering.solve.prepare", lambda: pytest.fail("solved"))
+    done = facade_here("layer-solve", RESIDENTIAL, *words)
+    assert done.returncode == 2
+    assert expected in done.stderr.decode()
+    assert list(tmp_path.iterdir()) == []

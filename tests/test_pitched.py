@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,13 +11,14 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from judges import khronos_issues
-from test_stylization import BOX, style_of
+from test_stylization import BOX, style_of, textured_box
 
 from facade_tools.artifacts.building import Box, Building, Chimney, Frame, Roof
 from facade_tools.formats import gltf
+from facade_tools.formats.textured import joined
 from facade_tools.geometry.solids import building_solid, triangulated
 from facade_tools.stylization.bases import building_blocks
-from facade_tools.stylization.pitched import crowned, plain_wall
+from facade_tools.stylization.pitched import attic, crowned, plain_wall
 from facade_tools.stylization.retarget import RAISED, retarget
 
 
@@ -31,6 +33,26 @@ def house(roof, height=6.0, **more):
 
 def dressed(style, building):
     return crowned(retarget(style, building_blocks(building)), style, building)
+
+
+def flushed(style, building):
+    scene = retarget(style, building_blocks(building), flush=True)
+    return crowned(scene, style, building)
+
+
+@pytest.fixture(scope="module")
+def ornate():
+    """Walls of two depths behind a cornice, a niche, and a storey set back on all sides."""
+    boxes = [
+        ((0.6, 0.6, 0), (19.4, 11.4, 1.5)), ((0.7, 0.7, 1.5), (19.3, 11.3, 3)),
+        ((0, 0, 3), (20, 12, 3.4)),
+        ((0.6, 1.6, 3.4), (19.4, 11.4, 7)), ((0.6, 0.6, 3.4), (7, 1.6, 7)),
+        ((13, 0.6, 3.4), (19.4, 1.6, 7)), ((2.5, 2.5, 7), (17.5, 9.5, 9.5)),
+    ]  # fmt: skip
+    mesh = joined([textured_box(low, high) for low, high in boxes])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("facade_tools.stylization.structure.LEAST_CHANGE", 9.0)  # one block
+        return style_of(mesh, front=180.0)
 
 
 def parts(scene, name):
@@ -59,6 +81,67 @@ def test_a_flat_house_keeps_the_roof_of_the_style(style):
     assert any(mesh.name.endswith("/roof") for mesh in scene.meshes)
 
 
+WINGS = (
+    Box("a", "general", 0, 0, 12, 8, 6.0, Roof("gable", 45, "x", 0.3)),
+    Box("b", "general", 9, 0, 6, 6, 3.2, Roof("gable", 35, "x", 0.3)),
+    Box("c", "general", -2, 6, 5, 4, 6.0, Roof("hip", 35, "y", 0.3)),
+)
+
+
+def test_no_film_of_the_attic_hangs_on_the_walls():
+    """Where boxes end otherwise than their parts, by rounding, nothing is left of their walls."""
+    building = Building("house", COLONIAL)
+    solid = building_solid(building)
+    assert attic(building, solid, 0.0, 0.0).vertices[:, 2].min() == 0.0
+    assert attic(building, solid, 1e-6, 0.0).vertices[:, 2].min() == 3.0
+
+
+COLONIAL = (  # 5.6 + 11.2 / 2 is not quite 13.0 - 3.6 / 2
+    Box("main", "general", 5.6, 4.5, 11.2, 9.0, 6.0, Roof("gable", 32, "x", 0.3)),
+    Box("east", "general", 13.0, 4.5, 3.6, 6.0, 3.0, Roof("gable", 28, "x", 0.25)),
+    Box("west", "general", -1.8, 4.5, 3.6, 6.0, 3.0, Roof("gable", 28, "x", 0.25)),
+)
+
+
+FLAT = tuple(replace(box, roof=Roof("flat")) for box in COLONIAL)
+
+
+@pytest.mark.parametrize("boxes", [WINGS, COLONIAL, FLAT])
+def test_walls_with_relief_reach_their_roofs_and_neighbours(ornate, boxes):
+    """The mass is one body, and as large as the house but for niches and cornices."""
+    building = Building("house", boxes)
+    vertices, triangles, _ = triangulated(building_solid(building))
+    whole = trimesh.Trimesh(vertices, triangles, process=False)
+    (mass,) = parts(flushed(ornate, building), "mass")
+    solid = trimesh.Trimesh(mass.vertices.astype(np.float32), mass.faces, process=True)
+    assert solid.is_volume
+    assert solid.body_count == 1
+    assert solid.volume == pytest.approx(whole.volume, rel=0.06)
+    (mass,) = parts(dressed(ornate, building), "mass")
+    assert solid.volume > 1.1 * trimesh.Trimesh(mass.vertices, mass.faces).volume
+
+
+def test_walls_stand_on_the_sides_and_cornices_before_them(ornate):
+    building = house(Roof("gable", 45, "x"))
+    scene = flushed(ornate, building)
+    front = np.concatenate([m.vertices for m in scene.meshes if m.name.endswith("/front")])
+    planes = np.round(front[:, 1] + RAISED, 3)
+    assert planes.min() == pytest.approx(-4 - 0.25)  # the cornice
+    assert (planes == -4.0).mean() > 0.4
+    top = front[front[:, 2] > 5.9]
+    assert top[:, 1] == pytest.approx(-4 - RAISED, abs=1e-6)  # set back in the style
+    assert np.ptp(top[:, 0]) == pytest.approx(12.0)
+
+
+def test_a_style_without_relief_is_put_on_as_ever(style):
+    building = Building("house", WINGS)
+    plain, flush = (made(style, building).meshes for made in (dressed, flushed))
+    assert [mesh.name for mesh in plain] == [mesh.name for mesh in flush]
+    for a, b in zip(plain, flush, strict=True):
+        assert np.array_equal(a.vertices, b.vertices)
+        assert np.array_equal(a.faces, b.faces)
+
+
 def test_porches_and_chimneys_stand_where_the_building_has_them(style):
     boxes = (*house(Roof("hip", 30)).boxes, Box("p", "porch", 0, -5, 4, 2, 2.6, Roof("flat")))
     building = Building("house", boxes, chimneys=(Chimney(1.0, 1.0, 0.6, 0.6, 10.0),))
@@ -84,6 +167,35 @@ def test_the_mass_is_one_closed_solid_with_its_roof(style, turned):
     whole = trimesh.Trimesh(vertices, triangles, process=False)
     assert solid.is_volume
     assert solid.volume == pytest.approx(whole.volume, rel=1e-5)
+
+
+def test_no_slit_is_left_under_the_attic(style):
+    """Wings whose eaves are not the walls' heights to the last digit."""
+    boxes = (
+        Box("main", "general", 6.6, 4.6, 13.2, 9.2, 6.0, Roof("gable", 37, "x", 0.3)),
+        Box("east", "general", 15.1, 4.6, 3.8, 6.2, 3.0, Roof("gable", 28, "x", 0.25)),
+        Box("west", "general", -1.9, 4.6, 3.8, 6.2, 3.0, Roof("gable", 28, "x", 0.25)),
+    )
+    (mass,) = parts(dressed(style, Building("house", boxes)), "mass")
+    written = trimesh.Trimesh(mass.vertices.astype(np.float32), mass.faces, process=True)
+    assert written.is_volume
+
+
+@pytest.mark.parametrize("place", [0.0, 300.0])
+def test_the_mass_under_a_cone_stays_closed_in_single_precision(style, place):
+    """A tower's cone in the valley of two roofs, as on the sample houses."""
+    boxes = (
+        Box("main", "general", 5.1, 5.3, 10.2, 10.6, 6.4, Roof("hip", 44, "y", 0.35)),
+        Box("tower", "general", 9.5, 0.7, 3.2, 3.2, 7.2, Roof("cone", 60, "x", 0.2)),
+        Box("cross", "general", -0.2, 6.54, 2.4, 4.6, 6.4, Roof("gable", 44, "x", 0.35)),
+        Box("rear", "general", 4.6, 12.2, 7.2, 3.2, 3.2, Roof("hip", 25, "x", 0.3)),
+    )
+    frame = Frame(0.0, (place, place, 0.0)) if place else None
+    (mass,) = parts(dressed(style, Building("house", boxes, frame=frame)), "mass")
+    written = trimesh.Trimesh(mass.vertices.astype(np.float32), mass.faces, process=True)
+    assert written.is_volume
+    assert len(written.faces) == len(mass.faces)
+    assert len(np.unique(mass.faces)) == len(mass.vertices)
 
 
 def test_the_roof_turns_with_the_building(style):

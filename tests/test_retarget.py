@@ -185,6 +185,33 @@ def test_storeys_are_inserted_not_stretched():
         assert placed.storeys[-1].top == pytest.approx(own.z + height)
 
 
+def test_storeys_of_a_model_that_is_not_in_metres_are_inserted():
+    parts = []
+    for k in range(6):
+        parts.append(textured_box((0, 0, 1.5 * k), (8, 5, 1.5 * k + 1.2)))
+        parts.append(textured_box((0.4, 0.4, 1.5 * k + 1.2), (7.6, 4.6, 1.5 * k + 1.5)))
+    style = style_of(joined(parts))
+    own = style.blocks.blocks[0]
+    target = replace(style.blocks, blocks=(replace(own, height=13.5),))
+    assert len(placed_blocks(style.sheet, style.blocks, target)[0].storeys) == 18
+
+
+def test_sign_boards_and_mouldings_are_no_storeys():
+    """Two boards of 0.8 m with a joint of 0.2 m each, on a wall that grows to its double."""
+    levels = [(0, 3.4), (0.3, 0.2), (0.15, 0.8), (0.3, 0.2), (0.15, 0.8), (0, 4.6)]
+    parts, z = [], 0.0
+    for inset, height in levels:
+        low, high = (inset, inset, z), (16 - inset, 10 - inset, z + height)
+        parts.append(textured_box(low, high))
+        z += height
+    style = style_of(joined(parts))
+    own = max(style.blocks.blocks, key=lambda block: block.height)
+    target = replace(style.blocks, blocks=(replace(own, height=20.0),))
+    floors = [floor for floor in style.sheet.floors if floor.block == own.id]
+    assert len(floors) > 4
+    assert len(placed_blocks(style.sheet, style.blocks, target)[0].storeys) == len(floors)
+
+
 # --- overhangs, snapping, re-assignment -----------------------------------------------------------
 def recessed():
     """A block with a recess 2 m deep in the middle of its front, under nothing."""
@@ -443,3 +470,86 @@ def test_niches_in_the_plan_are_repeated_and_keep_their_width(factor, count):
     assert closed(scene.meshes[0])
     front = next(m for m in scene.meshes if m.name == f"{block.id}/front")
     assert wall_area(front) == pytest.approx(18 * factor * 6, rel=0.01)
+
+
+# --- the command ----------------------------------------------------------------------------------
+BLOCK = {
+    "id": "a", "role": "body", "x": 0, "y": 0, "z": 0, "width": 18, "depth": 9, "height": 9,
+    "floors": 3,
+}  # fmt: skip
+
+
+def base_file(path, identity="b", blocks=(BLOCK,), **more):
+    document = {"schema": "facade-tools/blocks/1", "id": identity, "blocks": list(blocks), **more}
+    path.write_text(json.dumps(document))
+    return path
+
+
+@pytest.fixture
+def sheet(styles, tmp_path):
+    style = styles["l-block"]
+    (tmp_path / "style").mkdir()
+    write_style(tmp_path / "style", style.sheet, style.blocks, style.pictures)
+    return tmp_path / "style"
+
+
+def test_several_bases_into_one_file_are_refused_before_any_work(facade_here, sheet, tmp_path):
+    bases = [base_file(tmp_path / f"{name}.json", name) for name in "ab"]
+    done = facade_here("retarget", sheet, *bases, "-o", tmp_path / "x" / "one.glb")
+    assert done.returncode == 2
+    assert "several bases; name a folder" in done.stderr.decode()
+    assert not (tmp_path / "x").exists()
+
+
+def test_ids_that_are_one_file_name_are_refused(facade_here, sheet, tmp_path):
+    bases = [base_file(tmp_path / f"{k}.json", name) for k, name in enumerate(["a/b", "a_b"])]
+    done = facade_here("retarget", sheet, *bases, "-o", tmp_path / "out")
+    assert done.returncode == 3
+    assert "id 'a_b' stands twice" in done.stderr.decode()
+
+
+def test_meshes_of_one_folder_are_named_by_their_files(facade_here, sheet, tmp_path):
+    for name in ("d/one.obj", "d/two.obj", "e/model.obj", "here.obj"):
+        path = tmp_path / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes((SAMPLES / "l-block" / "model.obj").read_bytes())
+    words = ("retarget", sheet, "d/one.obj", "d/two.obj", "e/model.obj", "here.obj")
+    done = facade_here(*words, "-o", tmp_path / "out", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    made = sorted(path.name for path in (tmp_path / "out").iterdir())
+    assert made == ["e.glb", "here.glb", "one.glb", "two.glb"]
+
+
+SINGULAR = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 0], [0, 0, 0, 1]]
+PROJECTIVE = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0.1, 0, 0, 1]]
+
+
+@pytest.mark.parametrize(
+    ("more", "expected"),
+    [
+        ({"frame": SINGULAR}, "/frame: is singular"),
+        ({"frame": PROJECTIVE}, "/frame: is singular or projective"),
+        ({"blocks": [BLOCK, BLOCK | {"x": 20}]}, "/blocks/1/id: id 'a' stands twice"),
+    ],
+)
+def test_bases_are_checked(facade_here, sheet, tmp_path, more, expected):
+    base = base_file(tmp_path / "b.json", **more)
+    done = facade_here("retarget", sheet, base, "-o", tmp_path / "x.glb")
+    assert done.returncode == 3
+    assert f"{base}: {expected}" in done.stderr.decode()
+    assert not (tmp_path / "x.glb").exists()
+    assert expected in facade_here("validate", base).stdout.decode()
+
+
+def test_bad_bases_are_skipped_if_asked(facade_here, sheet, tmp_path):
+    bases = [
+        base_file(tmp_path / "bad.json", "bad", frame=SINGULAR),
+        base_file(tmp_path / "good.json", "good"),
+    ]
+    out = tmp_path / "out"
+    assert facade_here("retarget", sheet, *bases, "-o", out).returncode == 3
+    assert not out.exists()
+    done = facade_here("retarget", sheet, *bases, "-o", out, "--on-error", "skip")
+    assert done.returncode == 3
+    assert "1 bad items were skipped" in done.stderr.decode()
+    assert [path.name for path in out.iterdir()] == ["good.glb"]

@@ -102,6 +102,24 @@ def test_a_damaged_ply_is_refused_or_read(tmp_path_factory, encoding, data):
     assert np.isfinite(mesh.vertices).all()
 
 
+@pytest.mark.parametrize("line", ["v nan 0 1", "v 1 inf 0", "v 1 2"])
+def test_a_vertex_that_is_no_point_is_refused_with_its_line(tmp_path, line):
+    path = tmp_path / "x.obj"
+    path.write_text(f"v 0 0 0\n{line}\nv 1 1 1\nf 1 2 3\n")
+    with pytest.raises(InvalidInput, match=f"{path}:2: vertices need three finite"):
+        read_textured(path)
+
+
+def test_a_ply_that_is_not_finite_is_refused_with_its_file(tmp_path):
+    path = tmp_path / "x.ply"
+    lines = ["ply", "format ascii 1.0", "element vertex 3"]
+    lines += [f"property float {a}" for a in "xyz"]
+    lines += ["element face 1", "property list uchar int vertex_index", "end_header"]
+    path.write_text("\n".join([*lines, "0 0 0", "1 nan 0", "0 0 1", "3 0 1 2"]))
+    with pytest.raises(InvalidInput, match=f"{path}: .*finite"):
+        read_textured(path)
+
+
 DAE = """<?xml version="1.0"?>
 <COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
 <asset><unit name="inch" meter="0.0254"/><up_axis>Z_UP</up_axis></asset>

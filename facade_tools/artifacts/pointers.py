@@ -7,6 +7,11 @@ from typing import Any
 from ..errors import InvalidInput, Place
 
 
+def escaped(key: str) -> str:
+    """Return a key as a part of a JSON pointer."""
+    return key.replace("~", "~0").replace("/", "~1")
+
+
 def line_of(data: bytes, pointer: str) -> int | None:
     """Return the line (from 1) of the value at a JSON pointer in YAML or JSON text.
 

@@ -33,10 +33,17 @@ def read_textured(path: Path) -> TexturedMesh:
             str(path)
         )
     own = {".obj": read_obj, ".ply": read_ply, ".dae": read_dae}
-    if ending in own:
-        return own[ending](path)
+    try:
+        return own.get(ending, _read_gltf)(path)
+    except InvalidInput as error:
+        raise error.at(str(path)) from None
+
+
+def _read_gltf(path: Path) -> TexturedMesh:
     read_bytes(path)
     mesh = _through_trimesh(path)
+    if not np.isfinite(mesh.vertices).all():
+        raise InvalidInput("holds coordinates that are not finite; expected metres")
     return replace(mesh, vertices=mesh.vertices @ Y_UP.T)
 
 

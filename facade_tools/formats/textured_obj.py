@@ -50,7 +50,7 @@ def _parsed(text: str, name: str) -> _Content:
         word, _, rest = line.strip().partition(" ")
         try:
             if word == "v":
-                content.positions.append(tuple(map(float, rest.split()[:3])))
+                content.positions.append(_position(rest))
             elif word == "vt":
                 content.texture.append(tuple(map(float, rest.split()[:2])))
             elif word == "f":
@@ -59,10 +59,19 @@ def _parsed(text: str, name: str) -> _Content:
                 paint = _paint_index(content, rest.strip())
             elif word == "mtllib":
                 content.libraries.append(rest.strip())
+        except InvalidInput as error:
+            raise error.at(name, number) from None
         except (ValueError, IndexError):
             place = Place(name, number)
             raise InvalidInput(f"{line.strip()[:60]!r} is no OBJ statement", place) from None
     return content
+
+
+def _position(rest: str) -> tuple[float, ...]:
+    position = tuple(map(float, rest.split()[:3]))
+    if len(position) != 3 or not all(map(math.isfinite, position)):
+        raise InvalidInput("vertices need three finite coordinates")
+    return position
 
 
 def _add_face(content: _Content, rest: str, paint: int) -> None:

@@ -2,30 +2,20 @@
 
 from __future__ import annotations
 
-import base64
-import binascii
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from ..artifacts.layout import Layout, LayoutShape
 from ..errors import InvalidInput
-from ..geometry.arrays import Floats, Points2, Points3, Triangles
+from ..geometry.arrays import Points2, Points3, Triangles
 from ..geometry.mesh import Material, Mesh, Scene
+from .assets import MESH, Asset, mesh_of, picture_of
 
 BEHIND = 0.1  # metres that a box reaches behind the canvas, and its least thickness
 MOST_FACES = 5_000_000
 PLAIN = "#a9866a"
-
-
-@dataclass(frozen=True, slots=True)
-class Asset:
-    """A mesh within the unit cube: x to the right, y to the back, z up."""
-
-    vertices: Points3
-    faces: Triangles
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,9 +43,9 @@ def layout_scene(layout: Layout) -> Scene:
     cannot be read, or where the assets have too many faces.
     """
     assets = {
-        name: _asset(name, entry)
+        name: mesh_of(name, entry)
         for name, entry in layout.assets.items()
-        if entry["media"] == "model/obj"
+        if entry["media"] == MESH
     }
     parts: dict[tuple[str, str], list[Patch]] = {}
     materials: dict[str, Material] = {}
@@ -112,11 +102,7 @@ def _material(name: str, shape: LayoutShape, layout: Layout) -> Material:
     entry = layout.assets.get(texture)
     if not texture or entry is None:
         return Material(_plain(name), color)
-    try:
-        picture = base64.b64decode(entry["data"], validate=True)
-    except binascii.Error:
-        raise InvalidInput("is no base64", pointer=f"/assets/{texture}/data") from None
-    return Material(_plain(name), "#ffffff", texture=picture)
+    return Material(_plain(name), "#ffffff", texture=picture_of(texture, entry))
 
 
 def _plain(name: str) -> str:
@@ -135,35 +121,3 @@ def _merged(name: str, material: str, patches: list[Patch]) -> Mesh:
         material,
         np.concatenate(uvs) if len(uvs) == len(patches) else None,
     )
-
-
-def _asset(name: str, entry: Mapping[str, Any]) -> Asset:
-    """Read an OBJ text (z up, front towards −y), scaled to the unit cube; polygons are fanned."""
-    points: list[list[float]] = []
-    faces: list[tuple[int, int, int]] = []
-    pointer = f"/assets/{name}/data"
-    for number, line in enumerate(entry["data"].splitlines(), 1):
-        words = line.split()
-        try:
-            if words[:1] == ["v"]:
-                points.append([float(word) for word in words[1:4]])
-            elif words[:1] == ["f"]:
-                ids = [int(word.split("/")[0]) for word in words[1:]]
-                row = [i - 1 if i > 0 else len(points) + i for i in ids]
-                faces += [(row[0], row[k], row[k + 1]) for k in range(1, len(row) - 1)]
-        except ValueError:
-            raise InvalidInput(
-                f"OBJ line {number} is no {words[0]!r} line", pointer=pointer
-            ) from None
-    vertices = np.array(points, dtype=np.float64).reshape(len(points), -1)
-    triangles = np.array(faces, dtype=np.int64).reshape(-1, 3)
-    good = vertices.shape[1:] == (3,) and len(triangles) and np.all(np.isfinite(vertices))
-    if not good or triangles.min() < 0 or triangles.max() >= len(vertices):
-        raise InvalidInput("has no faces over existing vertices", pointer=pointer)
-    return Asset(_unit(vertices), triangles)
-
-
-def _unit(vertices: Floats) -> Floats:
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
-    unit: Floats = (vertices - low) / np.maximum(high - low, 1e-12)
-    return unit

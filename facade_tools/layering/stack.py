@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from ..artifacts.design import Appearance, Design, DesignLayer, DesignSymbol
+from ..artifacts.pointers import escaped
 from ..errors import InvalidInput
 from .language import (
     MAX_DEPTH,
@@ -124,7 +125,7 @@ def stack_of(design: Design) -> Stack:
 
 def _pattern(design: Design, name: str) -> Pattern:
     raw = design.patterns[name]
-    pointer = f"/patterns/{_escaped(name)}"
+    pointer = f"/patterns/{escaped(name)}"
     settings = raw if isinstance(raw, Mapping) else {}
     shapes = {key: Appearance(**value) for key, value in settings.get("shapes", {}).items()}
     visible = settings.get("visible")
@@ -134,10 +135,6 @@ def _pattern(design: Design, name: str) -> Pattern:
         None if visible is None else tuple(visible),
         shapes,
     )
-
-
-def _escaped(key: str) -> str:
-    return key.replace("~", "~0").replace("/", "~1")
 
 
 def _node(raw: Any, pointer: str, depth: int) -> Node:
@@ -152,7 +149,7 @@ def _node(raw: Any, pointer: str, depth: int) -> Node:
         extra = next((key for key in raw if key not in SETTINGS), None)
         if extra is not None:
             problem = f"{extra!r} is unknown beside `pattern`; only `control` has substitutions"
-            raise InvalidInput(problem, pointer=f"{pointer}/{_escaped(extra)}")
+            raise InvalidInput(problem, pointer=f"{pointer}/{escaped(extra)}")
         return _parsed(raw["pattern"], f"{pointer}/pattern")
     control = _parsed(raw["control"], f"{pointer}/control")
     known = symbols_of(control)
@@ -162,8 +159,8 @@ def _node(raw: Any, pointer: str, depth: int) -> Node:
             continue
         if key not in known:
             problem = f"{key!r} is no symbol of the control pattern {raw['control']!r}"
-            raise InvalidInput(problem, pointer=f"{pointer}/{_escaped(key)}")
-        contents.append((key, _node(value, f"{pointer}/{_escaped(key)}", depth + 1)))
+            raise InvalidInput(problem, pointer=f"{pointer}/{escaped(key)}")
+        contents.append((key, _node(value, f"{pointer}/{escaped(key)}", depth + 1)))
     return Substituted(control, tuple(contents))
 
 
@@ -198,11 +195,11 @@ def _check_counters(stack: Stack) -> None:
         missing = sorted(counters_of(pattern.node) - set(stack.design.counters))
         if missing:
             problem = f"counter {missing[0]!r} is not in `counters`; expected a number or auto"
-            raise InvalidInput(problem, pointer=f"/patterns/{_escaped(name)}")
+            raise InvalidInput(problem, pointer=f"/patterns/{escaped(name)}")
     for name, value in stack.design.counters.items():
         if isinstance(value, Mapping) and value["min"] > value["max"]:
             problem = "min is greater than max"
-            raise InvalidInput(problem, pointer=f"/counters/{_escaped(name)}")
+            raise InvalidInput(problem, pointer=f"/counters/{escaped(name)}")
 
 
 def _check_sizes(stack: Stack, free: set[str]) -> None:
@@ -214,7 +211,7 @@ def _check_sizes(stack: Stack, free: set[str]) -> None:
                     f"symbol {symbol!r} has no size and stands outside of control patterns; "
                     f"expected symbols: {{{symbol}: {{size: …}}}}"
                 )
-                raise InvalidInput(problem, pointer=f"/patterns/{_escaped(name)}")
+                raise InvalidInput(problem, pointer=f"/patterns/{escaped(name)}")
 
 
 def _solid(node: Node, control: bool) -> Iterator[str]:
@@ -242,10 +239,10 @@ def _check_shapes(stack: Stack) -> None:
     known = set(stack.design.symbols)
     tables: list[tuple[str, Mapping[str, Appearance]]] = [("/shapes", stack.design.shapes)]
     tables += [(f"/layers/{i}/shapes", la.shapes) for i, la in enumerate(stack.design.layers)]
-    tables += [(f"/patterns/{_escaped(n)}/shapes", p.shapes) for n, p in stack.patterns.items()]
+    tables += [(f"/patterns/{escaped(n)}/shapes", p.shapes) for n, p in stack.patterns.items()]
     for pointer, table in tables:
         for key in table:
-            place = f"{pointer}/{_escaped(key)}"
+            place = f"{pointer}/{escaped(key)}"
             try:
                 pair = symbol_pair(key)
             except PatternError as error:
@@ -254,7 +251,7 @@ def _check_shapes(stack: Stack) -> None:
                 if symbol != "*" and symbol not in known:
                     raise InvalidInput(f"symbol {symbol!r} does not exist", pointer=place)
     masks = [(f"/layers/{i}/visible", la.visible) for i, la in enumerate(stack.design.layers)]
-    masks += [(f"/patterns/{_escaped(n)}/visible", p.visible) for n, p in stack.patterns.items()]
+    masks += [(f"/patterns/{escaped(n)}/visible", p.visible) for n, p in stack.patterns.items()]
     for pointer, mask in masks:
         for i, symbol in enumerate(mask or ()):
             if symbol not in known:

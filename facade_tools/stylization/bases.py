@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +17,7 @@ from .model import CaptureOptions, modelled
 
 Rectangle = tuple[float, float, float, float]
 STOREY = 3.0  # m
+THINNEST = 1e-6  # of the axes' box: a frame that squeezes it further is singular
 HOUSE_DEPTH = 10.0  # m behind a layout's canvas
 BAY, BAY_DEPTH = 2.0, 0.5  # m: least width and height, and depth, of a bay
 
@@ -152,6 +153,25 @@ def frame_of(building: Building) -> tuple[tuple[float, ...], ...] | None:
     matrix[:2, :2] = [[c, -s], [s, c]]
     matrix[:3, 3] = building.frame.shift
     return tuple(tuple(row) for row in matrix.tolist())
+
+
+def blocks_problems(blocks: Blocks) -> Iterator[tuple[str, str]]:
+    """Yield pointer and message of what the schema cannot see: ids that stand twice, the frame."""
+    seen: set[str] = set()
+    for i, block in enumerate(blocks.blocks):
+        if block.id in seen:
+            yield f"/blocks/{i}/id", f"id {block.id!r} stands twice; expected unique ids"
+        seen.add(block.id)
+    if blocks.frame is not None and not _is_frame(np.array(blocks.frame, dtype=np.float64)):
+        yield "/frame", "is singular or projective; expected an invertible affine 4×4 matrix"
+
+
+def _is_frame(matrix: Floats) -> bool:
+    """Tell whether no axis is squeezed to nothing, and the last row is 0 0 0 1."""
+    lengths = np.linalg.norm(matrix[:3, :3], axis=0)
+    volume = abs(float(np.linalg.det(matrix[:3, :3])))
+    affine = np.allclose(matrix[3], [0, 0, 0, 1], rtol=0, atol=1e-9)
+    return bool(affine and volume > THINNEST * math.prod(lengths.tolist()) > 0)
 
 
 def mesh_blocks(mesh: TexturedMesh, identity: str) -> Blocks:

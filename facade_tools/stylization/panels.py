@@ -58,13 +58,21 @@ def panels(
     for index, item in enumerate(placed):
         others = [slab for k, own in enumerate(slabs) if k != index for slab in own]
         for storey in item.storeys:
-            for side, face in walls.get((item.source.id, storey.floor), []):
+            members = walls.get((item.source.id, storey.floor), [])
+            for side, face in _widest(members) if storey.boxed else members:
                 corners = face_corners(item, storey, face, side)
                 used = (of_group[face.vertical], of_group[face.horizontal])
                 panel = _panel(index, side, corners, face, used)
                 if panel is not None and len(seen := _seen(panel, others)):
                     found.append(replace(panel, seen=seen))
     return found
+
+
+def _widest(members: Sequence[tuple[str, StyleFace]]) -> list[tuple[str, StyleFace]]:
+    """Return the widest face of every side; a side without any takes that of another."""
+    ordered = sorted(members, key=lambda member: -abs(member[1].end - member[1].start))
+    best = dict(reversed(ordered))
+    return [(side, best.get(side, ordered[0][1])) for side in SIDES] if ordered else []
 
 
 def _panel(

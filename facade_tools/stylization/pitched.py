@@ -11,7 +11,7 @@ import numpy as np
 
 from ..artifacts.building import Building
 from ..artifacts.stylesheet import StyleFace
-from ..geometry.arrays import Floats, Points3
+from ..geometry.arrays import Floats, Points3, Triangles
 from ..geometry.details import crown_scene
 from ..geometry.mesh import Material, Mesh, Scene
 from ..geometry.solids import Solid, building_solid, triangulated
@@ -19,6 +19,7 @@ from ..geometry.triangulate import newell_normal
 from ..imaging.image_io import Picture
 from .atlas import encoded_page
 from .bases import frame_of
+from .placing import TOUCH
 from .retarget import RAISED, framed
 from .splitting import SplitRule
 from .style import Style, group_rule
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 
 WITHIN = 0.1  # of a plain section, left out at either end: lintels and sills reach into it
 SLIVER = 1e-4  # m above the eaves: what stands lower is the rounding of the solid
+LAP = 2e-3  # m that the attic reaches below the eaves where it would not hold otherwise
 LONGEST = 512  # pixels of a plain wall's texture
 Piece = tuple[Picture, tuple[float, float]]  # and its width and height, m
 
@@ -43,9 +45,10 @@ def crowned(scene: Scene, style: Style, building: Building) -> Scene:
     pitched = any(box.roof is not None and box.roof.style != "flat" for box in building.boxes)
     crown = crown_scene(building, solid if pitched else None)
     meshes, materials = list(crown.meshes), dict(crown.materials)
+    walls, *bare = scene.meshes  # the mass comes first
+    walls = _under_roof(walls, building, solid) if pitched else _filled(walls)
+    scene = replace(scene, meshes=(walls, *bare))
     if pitched:
-        attic = framed(_attic(building, solid), frame_of(building))
-        scene = replace(scene, meshes=tuple(_united(mesh, attic) for mesh in scene.meshes))
         picture, size = plain_wall(style)
         meshes.append(_gables(building, solid, size))
         materials["gable"] = Material("gable", "#ffffff", texture=encoded_page(picture))
@@ -57,14 +60,30 @@ def crowned(scene: Scene, style: Style, building: Building) -> Scene:
 
 
 # --- the closed solid -----------------------------------------------------------------------------
-def _attic(building: Building, solid: Solid) -> Mesh:
-    """Return what of the solid lies above the eaves of its boxes."""
+def _under_roof(walls: Mesh, building: Building, solid: Solid) -> Mesh:
+    """Return the closed walls with the attic on them as one closed mesh.
+
+    Walls end at heights rounded to a tenth of a millimetre, and boxes stand where rounding lets
+    them. Where that leaves a slit below the attic or a film of it on a wall, which single precision
+    closes, the boxes that are cut from it are a little wider, then lower.
+    """
+    found = walls
+    for wider, lower in ((0.0, 0.0), (TOUCH, 0.0), (TOUCH, LAP)):
+        top = framed(attic(building, solid, wider, lower), frame_of(building))
+        found = _united(walls, top)
+        if _simple(_as_written(found)):
+            break
+    return found
+
+
+def attic(building: Building, solid: Solid, wider: float, lower: float) -> Mesh:
+    """Return what of the solid lies above the eaves of its boxes, made wider and lower (m)."""
     from manifold3d import Manifold, OpType
 
     walls = [
-        Manifold.cube((box.width, box.depth, (box.height or 0.0) + 1.0)).translate(
-            (box.x - box.width / 2, box.y - box.depth / 2, -1.0)
-        )
+        Manifold.cube(
+            (box.width + 2 * wider, box.depth + 2 * wider, (box.height or 0.0) + 1.0 - lower)
+        ).translate((box.x - box.width / 2 - wider, box.y - box.depth / 2 - wider, -1.0))
         for box in building.boxes
         if box.kind != "porch"
     ]
@@ -73,12 +92,66 @@ def _attic(building: Building, solid: Solid) -> Mesh:
     return _mesh(Manifold.batch_boolean([whole, *walls], OpType.Subtract))
 
 
-def _united(mesh: Mesh, attic: Mesh) -> Mesh:
-    """Return the mesh `mass` with the attic on it, any other mesh as it is."""
-    if mesh.name != "mass":
+def _united(walls: Mesh, top: Mesh) -> Mesh:
+    whole = _filled(_mesh((_manifold(walls) + _manifold(top)).simplify(SLIVER)))
+    if _simple(_as_written(whole)):
+        return replace(walls, vertices=whole.vertices, faces=whole.faces)
+    used, faces = np.unique(_without_slivers(whole), return_inverse=True)
+    return replace(walls, vertices=whole.vertices[used], faces=faces.reshape(-1, 3))
+
+
+def _filled(mesh: Mesh) -> Mesh:
+    """Return a closed mesh without the hollows inside it, which nobody sees."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    count = len(mesh.faces)
+    edges = np.sort(mesh.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    edge = np.unique(edges, axis=0, return_inverse=True)[1].reshape(-1)
+    links = coo_array(
+        (np.ones(len(edge)), (np.arange(count).repeat(3), count + edge)),
+        shape=(4 * count, 4 * count),
+    )
+    parts = connected_components(links, directed=False)[1][:count]
+    corners = mesh.vertices[mesh.faces] - mesh.vertices.mean(axis=0)
+    outside = np.bincount(parts, weights=np.linalg.det(corners))[parts] > 0
+    if outside.all():
         return mesh
-    whole = _mesh((_manifold(mesh) + _manifold(attic)).simplify(SLIVER))
-    return replace(mesh, vertices=whole.vertices, faces=whole.faces)
+    used, faces = np.unique(mesh.faces[outside], return_inverse=True)
+    return replace(mesh, vertices=mesh.vertices[used], faces=faces.reshape(-1, 3))
+
+
+def _as_written(mesh: Mesh) -> Triangles:
+    """Return the triangles over vertices that are one where single precision makes them one."""
+    single = mesh.vertices.astype(np.float32)
+    names = np.unique(single, axis=0, return_inverse=True)[1].reshape(-1)
+    faces: Triangles = names[mesh.faces]
+    return faces
+
+
+def _without_slivers(mesh: Mesh) -> Triangles:
+    """Return the triangles of a closed mesh with its edges shorter than SLIVER drawn together.
+
+    Their ends would be one vertex where coordinates are written in single precision, and the mesh
+    closed no more. An edge stays whose ends cannot meet without an edge of four triangles.
+    """
+    faces = mesh.faces
+    edges = np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)), axis=0)
+    lengths = np.linalg.norm(np.diff(mesh.vertices[edges], axis=1)[:, 0], axis=1)
+    heirs = np.arange(len(mesh.vertices))
+    for a, b in edges[lengths < SLIVER].tolist():
+        drawn = np.where(heirs == heirs[b], heirs[a], heirs)
+        found = drawn[mesh.faces]
+        found = found[(found != np.roll(found, 1, axis=1)).all(axis=1)]
+        if _simple(found):
+            heirs, faces = drawn, found
+    return faces
+
+
+def _simple(faces: Triangles) -> bool:
+    """Tell whether no two triangles run along an edge in the same direction."""
+    edges = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    return len(np.unique(edges, axis=0)) == len(edges)
 
 
 def _mesh(solid: Manifold) -> Mesh:

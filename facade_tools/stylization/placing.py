@@ -14,26 +14,20 @@ from itertools import pairwise
 import numpy as np
 
 from ..artifacts.blocks import Block, Blocks
-from ..artifacts.stylesheet import StyleBlock, StyleFace, StyleFloor, StyleSheet
+from ..artifacts.stylesheet import StyleBlock, StyleFace, StyleSheet
 from ..geometry.arrays import Floats
-from .remesh import Slab, plan_difference, trimmed
+from .remesh import Slab, trimmed
 from .snapping import snapped
+from .storeys import Storey, cells, storeys
 from .structure import candidates, match_blocks
 
 TOUCH = 1e-6  # m
 SUPPORT = 0.9  # of the distance of the outer boundaries: thickness of a wall under an overhang
 FLUSH = 0.05  # m: walls nearer than that stand in one plane, and thinning would take all relief
-SAME = 0.02  # share of the plan, of the height: storeys that differ less are one storey repeated
+OUTER = 0.25  # of a block, in which the plane of most wall is looked for
+FULL = 0.9  # of a block's plan, that a floor under a roof made for the block must fill
+LEDGE = 0.25  # m: cornices and bases stand at most so far before a wall that is flush
 Knots = tuple[Floats, Floats]
-
-
-@dataclass(frozen=True, slots=True)
-class Storey:
-    """A floor of the source put between two heights of the target (m, absolute)."""
-
-    floor: int
-    bottom: float
-    top: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,13 +58,20 @@ def matched_blocks(sheet: StyleSheet, own: Blocks, target: Blocks) -> list[str]:
 
 
 def placed_blocks(
-    sheet: StyleSheet, own: Blocks, target: Blocks, chosen: Sequence[str] | None = None
+    sheet: StyleSheet,
+    own: Blocks,
+    target: Blocks,
+    chosen: Sequence[str] | None = None,
+    *,
+    flush: bool = False,
 ) -> list[Placed]:
     """Return the source block of every target block, mapped to its corners.
 
-    chosen: ids of the source blocks, if they are not those of least Ψ. From the ground up, walls
-    under overhangs are thinned and edges snapped to the blocks below (5.1.2, 5.2.1) unless the two
-    source blocks stand on each other like that themselves.
+    chosen: ids of the source blocks, if they are not those of least Ψ. flush: the plane of most
+    wall stands on each side of a block, what stands before it at most LEDGE outside, and floors
+    that would leave much of the block open fill it. From the ground up, walls under overhangs are
+    thinned and edges snapped to the blocks below (5.1.2, 5.2.1) unless the two source blocks stand
+    on each other like that themselves.
     """
     sources = {block.id: block for block in sheet.blocks}
     ids = matched_blocks(sheet, own, target) if chosen is None else chosen
@@ -78,6 +79,7 @@ def placed_blocks(
         _stretched(sheet, sources[name], block)
         for block, name in zip(target.blocks, ids, strict=True)
     ]
+    placed = [_flush(sheet, item) for item in placed] if flush else placed
     for pair in _stacked(placed):
         if not _native(own, placed[pair[0]], placed[pair[1]]):
             _supported(sheet, placed, pair)
@@ -85,7 +87,7 @@ def placed_blocks(
     for lower, upper in order:
         if not _native(own, placed[lower], placed[upper]):
             placed[upper] = _snapped(sheet, placed[lower], placed[upper])
-    return placed
+    return [_boxed(sheet, item) for item in placed] if flush else placed
 
 
 def foreign_blocks(own: Blocks, placed: Sequence[Placed]) -> list[int]:
@@ -100,14 +102,18 @@ def placed_slabs(sheet: StyleSheet, placed: Placed) -> list[Slab]:
         floor = sheet.floors[storey.floor]
         xs, ys = (placed.moved(a, np.array(v)) for a, v in enumerate((floor.xs, floor.ys)))
         plan = _without_nothing(Slab(storey.bottom, storey.top, xs, ys, cells(floor)))
+        if storey.boxed:
+            sides = _sides(placed.target)
+            plan = Slab(storey.bottom, storey.top, *sides, np.ones((1, 1), dtype=bool))
         if plan.cells.any():
             slabs.append(plan)
     return slabs
 
 
-def cells(floor: StyleFloor) -> np.ndarray:
-    """Return the plan of a floor as a mask (len(ys) − 1, len(xs) − 1)."""
-    return np.array([[cell == "1" for cell in row] for row in floor.cells], dtype=bool)
+def _sides(block: Block) -> tuple[Floats, Floats]:
+    """Return where a block begins and ends along x and y (m)."""
+    xs, ys = (block.x, block.x + block.width), (block.y, block.y + block.depth)
+    return np.array(xs), np.array(ys)
 
 
 def _without_nothing(slab: Slab) -> Slab:
@@ -126,59 +132,55 @@ def _stretched(sheet: StyleSheet, source: StyleBlock, block: Block) -> Placed:
             (source.size[1], block.y, block.depth),
         )
     )
-    return Placed(block, source, _storeys(sheet, source, block), (maps[0], maps[1]))
+    return Placed(block, source, storeys(sheet, source, block), (maps[0], maps[1]))
 
 
-# --- heights --------------------------------------------------------------------------------------
-def _storeys(sheet: StyleSheet, source: StyleBlock, block: Block) -> tuple[Storey, ...]:
-    """Return a block's floors at their new heights: like storeys repeated as often as fits best."""
-    floors = [i for i, floor in enumerate(sheet.floors) if floor.block == source.id]
-    first, unit, repeats = _run_of_storeys(sheet, floors)
-    order = floors
-    if repeats > 1:
-        lengths = [sheet.floors[i].top - sheet.floors[i].bottom for i in floors]
-        one = sum(lengths[first : first + unit * repeats]) / repeats
-        fixed = sum(lengths) - one * repeats
-        wanted = max(1, round((block.height - fixed) / one))
-        inner = [floors[first + k % (unit * repeats)] for k in range(unit * wanted)]
-        order = [*floors[:first], *inner, *floors[first + unit * repeats :]]
-    heights = np.array([sheet.floors[i].top - sheet.floors[i].bottom for i in order])
-    levels = block.z + np.concatenate([[0.0], np.cumsum(heights)]) * block.height / heights.sum()
-    return tuple(
-        Storey(floor, float(bottom), float(top))
-        for floor, bottom, top in zip(order, levels[:-1], levels[1:], strict=True)
-    )
+def _flush(sheet: StyleSheet, placed: Placed) -> Placed:
+    """Bring the planes of most wall to the sides of the target's block."""
+    maps = []
+    for axis, sides in ((0, ("left", "right")), (1, ("front", "back"))):
+        size = placed.source.size[axis]
+        low, high = (_main_plane(sheet, placed.source.id, side, size) for side in sides)
+        new = placed.maps[axis][1]
+        start, end = float(new[0]), float(new[-1])
+        knots = [(low, start), (size - high, end)]
+        knots = [(0.0, start - min(low, LEDGE))] * (low > TOUCH) + knots
+        knots += [(size, end + min(high, LEDGE))] * (high > TOUCH)
+        maps.append((np.array([k for k, _ in knots]), np.array([v for _, v in knots])))
+    return replace(placed, maps=(maps[0], maps[1]))
 
 
-def _run_of_storeys(sheet: StyleSheet, floors: Sequence[int]) -> tuple[int, int, int]:
-    """Return first floor, floors a storey, and number of storeys of the highest run of like ones.
+def _boxed(sheet: StyleSheet, placed: Placed) -> Placed:
+    """Let floors that fill less than FULL of their block fill all of it."""
+    xs, ys = _sides(placed.target)
+    least = FULL * float(np.ptp(xs) * np.ptp(ys))
+    found = []
+    for storey in placed.storeys:
+        floor = sheet.floors[storey.floor]
+        widths, depths = (
+            np.diff(np.clip(placed.moved(axis, np.array(lines)), sides[0], sides[1]))
+            for axis, (lines, sides) in enumerate(((floor.xs, xs), (floor.ys, ys)))
+        )
+        found.append(replace(storey, boxed=bool(depths @ cells(floor) @ widths < least)))
+    return replace(placed, storeys=tuple(found))
 
-    A storey may be several slabs (a window band, a parapet); like ones agree in height and plan.
+
+def _main_plane(sheet: StyleSheet, block: str, side: str, size: float) -> float:
+    """Return how far inside a block's side (m) most of its wall stands, within FLUSH.
+
+    It is looked for in the outer quarter of the block; a wall that is all further in stays there.
     """
-    plans = [_plan(sheet.floors[i]) for i in floors]
-    best = (0.0, 0, 1, 1)
-    for unit in range(1, min(6, len(plans) // 2) + 1):
-        like = [_like(plans[k], plans[k + unit]) for k in range(len(plans) - unit)]
-        start = 0
-        for k in range(len(like) + 1):
-            if k < len(like) and like[k]:
-                continue
-            repeats = (k - start) // unit + 1 if k > start else 1
-            height = sum(plan.height for plan in plans[start : start + unit * repeats])
-            if repeats > 1 and height > best[0] * 1.01:
-                best = (height, start, unit, repeats)
-            start = k + 1
-    return best[1:]
-
-
-def _plan(floor: StyleFloor) -> Slab:
-    return Slab(floor.bottom, floor.top, np.array(floor.xs), np.array(floor.ys), cells(floor))
-
-
-def _like(a: Slab, b: Slab) -> bool:
-    return abs(a.height - b.height) < SAME * max(a.height, b.height) + 0.05 and (
-        plan_difference(a, b) < SAME
+    wall = next(w for w in sheet.walls if w.block == block and w.side == side)
+    depths = np.array(
+        [f.place if side in ("left", "front") else size - f.place for f in wall.faces]
     )
+    areas = np.array([abs(f.end - f.start) * (f.top - f.bottom) for f in wall.faces])
+    near = depths < OUTER * size
+    if not near.any():
+        return 0.0
+    depths, areas = depths[near], areas[near]
+    shares = (np.abs(depths[:, None] - depths) < FLUSH) @ areas
+    return float(max(0.0, depths[int(np.argmax(shares))]))
 
 
 # --- stacks ---------------------------------------------------------------------------------------
@@ -302,11 +304,20 @@ def _edges(sheet: StyleSheet, placed: Placed, axis: int) -> Floats:
 
 
 def face_corners(placed: Placed, storey: Storey, face: StyleFace, side: str) -> Floats:
-    """Return the corners (4, 3) of a face in the target: lower left, lower right, upper ones."""
+    """Return the corners (4, 3) of a face in the target: lower left, lower right, upper ones.
+
+    On a storey that fills its block a face is the whole side.
+    """
     axis = 0 if side in ("front", "back") else 1
     corners = np.empty((4, 3))
-    start, end = placed.moved(axis, np.array([face.start, face.end])).tolist()
+    if storey.boxed:
+        sides = _sides(placed.target)
+        start, end = sides[axis].tolist()[:: 1 if side in ("front", "right") else -1]
+        place = sides[1 - axis][0 if side in ("front", "left") else 1]
+    else:
+        start, end = placed.moved(axis, np.array([face.start, face.end])).tolist()
+        place = placed.moved(1 - axis, np.array([face.place]))[0]
     corners[:, axis] = [start, end, end, start]
-    corners[:, 1 - axis] = placed.moved(1 - axis, np.array([face.place]))[0]
+    corners[:, 1 - axis] = place
     corners[:, 2] = [storey.bottom, storey.bottom, storey.top, storey.top]
     return corners

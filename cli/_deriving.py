@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from math import isfinite, nan
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,7 @@ from facade_tools.reconstruction.records import derivation_of
 from ._items import each
 from ._lots import Ground, grounds
 from ._models import Made, Wanted, wanted, write_models
-from ._options import StreamOptions
+from ._options import StreamOptions, finite
 from ._stream import refuse_overwriting, refuse_single, side_input
 
 NAME = "derive"
@@ -54,12 +53,9 @@ def run_derive(grammar: str, stream: StreamOptions, values: Mapping[str, Any]) -
 def _value(text: str) -> tuple[str, float]:
     name, _, value = text.partition("=")
     try:
-        found = float(value)
+        return name.strip(), finite(value)
     except ValueError:
-        found = nan
-    if not isfinite(found):
-        raise click.UsageError(f"--set {text!r}: expected NAME=NUMBER")
-    return name.strip(), found
+        raise click.UsageError(f"--set {text!r}: expected NAME=NUMBER") from None
 
 
 @dataclass(frozen=True)

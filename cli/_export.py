@@ -19,7 +19,7 @@ from facade_tools.formats.exporting import ENDINGS, model_files, placed, vertex_
 
 from ._items import each, load
 from ._options import StreamOptions
-from ._stream import file_name, is_folder, refuse_overwriting
+from ._stream import file_name, is_folder, new_file_name, refuse_overwriting
 
 MOST_VERTICES = 30_000_000  # in one file: about 2 GB of memory
 
@@ -100,9 +100,7 @@ def _ending(output: str) -> str | None:
 def _to_folder(stream: StreamOptions, folder: Path, convert: Files) -> None:
     seen: set[str] = set()
     for identity, files in each("export", convert, stream):
-        if file_name(identity) in seen:
-            raise InvalidInput(f"id {identity!r} stands twice; expected unique ids in a folder")
-        seen.add(file_name(identity))
+        new_file_name(identity, seen)
         write_files(folder, files)
 
 

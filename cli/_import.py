@@ -12,15 +12,15 @@ from typing import Any
 
 from facade_tools.artifacts.documents import parse_yaml
 from facade_tools.artifacts.store import unreadable
-from facade_tools.errors import FacadeError, InvalidInput
+from facade_tools.errors import InvalidInput
 from facade_tools.formats.assessor import parse_columns
 from facade_tools.formats.importing import Importer, Written, items
 from facade_tools.formats.reading import ReadOptions
 from facade_tools.parallel import Outcome, map_ordered
 
 from ._options import StreamOptions
-from ._report import Progress, say_error
-from ._stream import Write, open_sink, refuse_overwriting
+from ._report import Progress
+from ._stream import Faults, Write, open_sink, refuse_overwriting
 
 logger = logging.getLogger("facade_tools.import")
 
@@ -32,7 +32,8 @@ def run_import(options: ReadOptions, stream: StreamOptions) -> None:
     outcomes = map_ordered(
         importer, items(stream.inputs, options), jobs=stream.jobs, scheduler=stream.scheduler
     )
-    tally = _Tally(stream.on_error == "skip")
+    faults = Faults("import", stream.on_error)
+    tally = _Tally(faults)
     progress = Progress("import")
     with open_sink(stream.output) as write:
         for outcome in outcomes:
@@ -40,8 +41,7 @@ def run_import(options: ReadOptions, stream: StreamOptions) -> None:
             progress.advance()
         progress.close()
     tally.report()
-    if tally.refused:
-        raise InvalidInput(f"{tally.refused} bad items were skipped")
+    faults.complain()
 
 
 def read_columns(path: str | None) -> dict[str, Any] | None:
@@ -76,39 +76,32 @@ def _converter(options: ReadOptions) -> Callable[[Any], Any] | None:
 class _Tally:
     """Writes what was read, and counts it, what was refused and which rules were applied."""
 
-    def __init__(self, skip: bool) -> None:
-        """Start at nothing; `skip` goes on after a bad item."""
-        self.skip = skip
+    def __init__(self, faults: Faults) -> None:
+        """Start at nothing."""
+        self.faults = faults
         self.kinds: Counter[str] = Counter()
         self.notes: Counter[str] = Counter()
-        self.refused = 0
         self.seen = _Ids()
 
     def take(self, outcome: Outcome[Written], write: Write) -> None:
         """Write one item's artifacts, or report its error."""
         if outcome.value is None:
-            self._refuse(outcome.error or InvalidInput("cannot be read"))
+            self.faults(outcome.error or InvalidInput("cannot be read"))
             return
         for identity, data in outcome.value.rows:
             if not self.seen.add(identity):
                 message = f"id {identity!r} stands twice; expected unique ids"
-                self._refuse(InvalidInput(message, outcome.value.place))
+                self.faults(InvalidInput(message, outcome.value.place))
                 continue
             write(identity, data)
         self.kinds += outcome.value.kinds
         self.notes += outcome.value.notes
 
-    def _refuse(self, error: Exception) -> None:
-        if not self.skip or not isinstance(error, FacadeError):
-            raise error
-        say_error("import", error)
-        self.refused += 1
-
     def report(self) -> None:
         """Log what was read and every rule that was applied, with its count."""
         read = ", ".join(f"{count} {kind}" for kind, count in sorted(self.kinds.items()))
-        level = logging.WARNING if self.notes or self.refused else logging.INFO
-        logger.log(level, "import: read %s; refused %d", read or "nothing", self.refused)
+        level = logging.WARNING if self.notes or self.faults.count else logging.INFO
+        logger.log(level, "import: read %s; refused %d", read or "nothing", self.faults.count)
         for note, count in sorted(self.notes.items()):
             logger.warning("import: %d × %s", count, note)
 

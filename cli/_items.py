@@ -8,11 +8,11 @@ from importlib import import_module
 from typing import Any, TypeVar
 
 from facade_tools.artifacts.store import read_raw
-from facade_tools.errors import FacadeError, InvalidInput
 from facade_tools.parallel import map_ordered
 
 from ._options import StreamOptions
-from ._report import Progress, say_error
+from ._report import Progress
+from ._stream import Faults
 
 R = TypeVar("R")
 
@@ -37,20 +37,15 @@ def each(
     """
     items = read_raw(stream.inputs) if items is None else items
     outcomes = map_ordered(function, items, jobs=stream.jobs, scheduler=stream.scheduler)
-    progress = Progress(name)
-    bad = 0
+    progress, faults = Progress(name), Faults(name, stream.on_error)
     with closing(outcomes):
         for outcome in outcomes:
             if outcome.value is not None:
                 yield outcome.value
             elif outcome.error is None:
                 continue
-            elif stream.on_error == "stop" or not isinstance(outcome.error, FacadeError):
-                raise outcome.error
             else:
-                say_error(name, outcome.error)
-                bad += 1
+                faults(outcome.error)
             progress.advance()
         progress.close()
-    if bad:
-        raise InvalidInput(f"{bad} bad items were skipped")
+    faults.complain()

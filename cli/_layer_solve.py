@@ -23,7 +23,7 @@ from facade_tools.layering.solve import solve_design, variations
 from facade_tools.randomness import item_generator
 
 from ._options import StreamOptions
-from ._stream import ItemResult, say_skipped, write_items
+from ._stream import Faults, ItemResult, is_single, refuse_single, write_items
 
 MAX_SWEEP = 1000
 MAX_ASSET = 16 << 20
@@ -63,21 +63,21 @@ class CanvasSolver:
 def run_layer_solve(path: str, stream: StreamOptions, options: Mapping[str, Any]) -> None:
     """Solve a design on every canvas that the options ask for, and write the layouts."""
     canvases = _canvases(options["width"], options["height"])
-    single = stream.output is not None and Path(stream.output).suffix == ".json"
-    if single and len(canvases) > 1:
-        raise click.UsageError(f"{stream.output}: several layouts; name a .jsonl file or a folder")
+    refuse_single(stream.output, len(canvases), "layouts")
     _check_sheet(options["sheet"])
     item = _only(path)
     drawn: list[Layout] = []
+    faults = Faults("layer-solve", stream.on_error)
     try:
         solver = _solver(path, item, stream.seed or 0, options)
-        solver = replace(solver, sweep=len(canvases) > 1, indented=single, drawn=drawn)
-        bad = write_items("layer-solve", solver, canvases, stream)
+        indented = is_single(stream.output)
+        solver = replace(solver, sweep=len(canvases) > 1, indented=indented, drawn=drawn)
+        write_items(solver, canvases, stream, faults)
     except InvalidInput as error:
         raise _with_line(error, item) from None
     if options["sheet"] and drawn:
         _write_sheet(str(options["sheet"]), drawn)
-    say_skipped(bad)
+    faults.complain()
 
 
 def _solver(path: str, item: RawItem, seed: int, options: Mapping[str, Any]) -> CanvasSolver:

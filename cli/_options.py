@@ -25,6 +25,14 @@ class StreamOptions:
     on_error: str
 
 
+def finite(text: str) -> float:
+    """Return a number. Raises ValueError where it is none, or not a finite one."""
+    number = float(text)
+    if not isfinite(number):
+        raise ValueError(text)
+    return number
+
+
 class Finite(click.types.FloatParamType):
     """A finite number: `nan` and `inf` are numbers to Python, and to no stage."""
 

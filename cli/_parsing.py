@@ -29,10 +29,13 @@ from facade_tools.randomness import item_generator
 from ._items import load
 from ._options import StreamOptions
 from ._rectifying import check_rectification, rectification_of
-from ._report import Progress, say_error
+from ._report import Progress
 from ._stream import (
+    Faults,
     file_name,
     is_folder,
+    is_single,
+    new_file_name,
     open_sink,
     refuse_overwriting,
     refuse_single,
@@ -171,11 +174,9 @@ def run_parse(stream: StreamOptions, options: ParseOptions) -> None:
         *side_input(options.mask),
         *_report_source(options),
     )
-    single = stream.output is not None and stream.output.lower().endswith(".json")
-    read = Read(options, stream.seed or 0, sources, single)
+    read = Read(options, stream.seed or 0, sources, is_single(stream.output))
     outcomes = map_ordered(read, paths, jobs=stream.jobs, scheduler=stream.scheduler)
-    progress = Progress(NAME)
-    bad = 0
+    progress, faults = Progress(NAME), Faults(NAME, stream.on_error)
     with open_sink(stream.output) as write, closing(outcomes):
         for outcome in outcomes:
             if outcome.value is not None:
@@ -183,15 +184,11 @@ def run_parse(stream: StreamOptions, options: ParseOptions) -> None:
                 _write_pictures(outcome.value, options, len(paths) > 1)
             elif outcome.error is None:
                 continue
-            elif stream.on_error == "stop" or not isinstance(outcome.error, FacadeError):
-                raise outcome.error
             else:
-                say_error(NAME, outcome.error)
-                bad += 1
+                faults(outcome.error)
             progress.advance()
         progress.close()
-    if bad:
-        raise InvalidInput(f"{bad} bad items were skipped")
+    faults.complain()
 
 
 FOREIGN = {"forest": ("height", "storey_height"), "mrf": ("classifier", "grammar", "solver")}
@@ -215,21 +212,13 @@ def _check_outputs(paths: list[str], output: str | None, options: ParseOptions) 
     identities = [Path(path).stem for path in paths]
     named = [target for name in PICTURE_OPTIONS if (target := getattr(options, name))]
     folder = output if output not in (None, "-") and is_folder(str(output)) else None
-    if named or folder:
-        _refuse_twice(identities)
+    seen: set[str] = set()
+    for identity in identities if named or folder else ():
+        new_file_name(identity, seen)
     written = [_target(name, identity, many) for name in named for identity in identities]
     parses = [output] if folder is None else [f"{folder}/{file_name(i)}.json" for i in identities]
     sides = (options.classifier, options.grammar, options.mask, options.rectify)
     refuse_overwriting([*paths, *sides], [*parses, *map(str, written)])
-
-
-def _refuse_twice(identities: list[str]) -> None:
-    seen: set[str] = set()
-    for identity in identities:
-        name = file_name(identity)
-        if name in seen:
-            raise InvalidInput(f"id {identity!r} stands twice; expected unique ids in a folder")
-        seen.add(name)
 
 
 def _target(named: str, identity: str, many: bool) -> Path:

@@ -82,9 +82,13 @@ class Faults:
     on_error: str
     count: int = 0
 
+    def stops(self, error: Exception) -> bool:
+        """Tell whether an error ends the stage; a bug is never skipped."""
+        return self.on_error == "stop" or not isinstance(error, FacadeError)
+
     def __call__(self, error: Exception) -> None:
-        """Take one error; a bug is never skipped."""
-        if self.on_error == "stop" or not isinstance(error, FacadeError):
+        """Take one error."""
+        if self.stops(error):
             raise error
         say_error(self.stage, error)
         self.count += 1
@@ -106,7 +110,7 @@ def side_input(path: str | None) -> tuple[Source, ...]:
 
 def run_stream(stage: ItemStage, stream: StreamOptions) -> None:
     """Run a stage over all inputs; raises the first error, or after --on-error skip the last."""
-    made = replace(stage, seed=stream.seed, indented=_single(stream.output))
+    made = replace(stage, seed=stream.seed, indented=is_single(stream.output))
     run_items(stage.name, made, read_raw(stream.inputs), stream)
 
 
@@ -114,22 +118,20 @@ def run_items(
     name: str, function: Callable[[Any], ItemResult], items: Iterable[Any], stream: StreamOptions
 ) -> None:
     """Write what `function` makes of each item; raises as `run_stream` does."""
-    say_skipped(write_items(name, function, items, stream))
-
-
-def say_skipped(bad: int) -> None:
-    """Raise InvalidInput at the end of a stream of which items were skipped."""
-    if bad:
-        raise InvalidInput(f"{bad} bad items were skipped")
+    faults = Faults(name, stream.on_error)
+    write_items(function, items, stream, faults)
+    faults.complain()
 
 
 def write_items(
-    name: str, function: Callable[[Any], ItemResult], items: Iterable[Any], stream: StreamOptions
-) -> int:
-    """Write what `function` makes of each item; return how many were skipped."""
+    function: Callable[[Any], ItemResult],
+    items: Iterable[Any],
+    stream: StreamOptions,
+    faults: Faults,
+) -> None:
+    """Write what `function` makes of each item; bad items go to `faults`."""
     outcomes = map_ordered(function, items, jobs=stream.jobs, scheduler=stream.scheduler)
-    progress = Progress(name)
-    bad = 0
+    progress = Progress(faults.stage)
     with open_sink(stream.output) as write, closing(outcomes):
         for outcome in outcomes:
             if outcome.value is not None:
@@ -138,15 +140,12 @@ def write_items(
                     write(identity, data)
             elif outcome.error is None:
                 continue
-            elif stream.on_error == "stop" or not isinstance(outcome.error, FacadeError):
-                _show_remote(outcome.traceback)
-                raise outcome.error
             else:
-                say_error(name, outcome.error)
-                bad += 1
+                if faults.stops(outcome.error):
+                    _show_remote(outcome.traceback)
+                faults(outcome.error)
             progress.advance()
         progress.close()
-    return bad
 
 
 def _show_remote(traceback: str) -> None:
@@ -157,7 +156,8 @@ def _show_remote(traceback: str) -> None:
 Write = Callable[[str, bytes], None]
 
 
-def _single(output: str | None) -> bool:
+def is_single(output: str | None) -> bool:
+    """Tell whether an output is a file of one artifact."""
     return output is not None and Path(output).suffix.lower() == ".json"
 
 
@@ -168,7 +168,7 @@ def is_folder(output: str) -> bool:
 
 def one_by_one(output: str | None) -> bool:
     """Tell whether an output takes artifacts one by one: a folder, or a file for a single one."""
-    return output not in (None, "-") and (is_folder(str(output)) or _single(output))
+    return output not in (None, "-") and (is_folder(str(output)) or is_single(output))
 
 
 @contextmanager
@@ -197,7 +197,7 @@ def _to_file(file: BinaryIO, output: str) -> Write:
     def write(_: str, data: bytes) -> None:
         nonlocal count
         count += 1
-        if count > 1 and _single(output):
+        if count > 1 and is_single(output):
             raise OutputFailed(f"{output}: several artifacts; name a .jsonl file or a folder")
         file.write(data)
 
@@ -208,10 +208,7 @@ def _to_folder(folder: Path, suffix: str) -> Write:
     seen: set[str] = set()
 
     def write(identity: str, data: bytes) -> None:
-        name = file_name(identity) + suffix
-        if name in seen:
-            raise InvalidInput(f"id {identity!r} stands twice; expected unique ids in a folder")
-        seen.add(name)
+        name = new_file_name(identity, seen) + suffix
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -227,9 +224,18 @@ def file_name(identity: str) -> str:
     return safe.lstrip(".") or "_"
 
 
+def new_file_name(identity: str, seen: set[str]) -> str:
+    """Return the file name of an item's id, added to those `seen`; raises InvalidInput on one."""
+    name = file_name(identity)
+    if name in seen:
+        raise InvalidInput(f"id {identity!r} stands twice; expected unique ids in a folder")
+    seen.add(name)
+    return name
+
+
 def refuse_single(output: str | None, count: int, noun: str) -> None:
     """Raise UsageError where one .json file is to take several artifacts."""
-    if count > 1 and _single(output):
+    if count > 1 and is_single(output):
         raise click.UsageError(f"{output}: several {noun}; name a .jsonl file or a folder")
 
 
@@ -255,4 +261,4 @@ def write_result(artifact: Any, output: str | None) -> None:
     """Write the only result of a stage."""
     document = encode(artifact)
     with open_sink(output) as write:
-        write(artifact.id, dump_document(document) if _single(output) else dump_line(document))
+        write(artifact.id, dump_document(document) if is_single(output) else dump_line(document))

@@ -25,8 +25,8 @@ from facade_tools.formats.style_folder import read_style, write_style
 from facade_tools.geometry.mesh import Scene
 from facade_tools.randomness import item_generator
 from facade_tools.stylization.bases import (
-    blocks_problems,
     building_blocks,
+    check_blocks,
     layout_blocks,
     mesh_blocks,
     with_ends,
@@ -42,7 +42,7 @@ from facade_tools.stylization.style import Style
 from ._export import write_files
 from ._items import each
 from ._options import StreamOptions
-from ._stream import file_name, is_folder
+from ._stream import file_name, is_folder, new_file_name
 
 log = logging.getLogger("facade_tools.capture_style")
 
@@ -98,8 +98,7 @@ class Dresser:
 
     def dressed(self, base: Blocks, plain: bool, building: Building | None) -> tuple[str, Scene]:
         """Return id and scene; plain: whether the base may be given a bottom and a top."""
-        for pointer, message in blocks_problems(base):
-            raise InvalidInput(message, pointer=pointer)
+        check_blocks(base)
         blocks = resized(base, self.sizes) if self.sizes else base
         rng = item_generator(self.seed, "retarget", base.id)
         chosen = self.styles[
@@ -128,10 +127,7 @@ def run_retarget(
     dresser = Dresser(sheets, sizes, small, stream.seed or 0)
     seen: set[str] = set()
     for identity, scene in each("retarget", dresser, stream, sources):
-        name = file_name(identity)
-        if name in seen:
-            raise InvalidInput(f"id {identity!r} stands twice; expected unique ids in a folder")
-        seen.add(name)
+        name = new_file_name(identity, seen)
         folder, stem = (
             (Path(output), name) if is_folder(output) else (Path(output).parent, Path(output).stem)
         )
@@ -140,8 +136,10 @@ def run_retarget(
 
 def _style(folder: Path) -> Style:
     sheet, blocks, pictures = read_style(folder)
-    for pointer, message in blocks_problems(blocks):
-        raise InvalidInput(message, pointer=pointer).at(str(folder / "blocks.json"))
+    try:
+        check_blocks(blocks)
+    except InvalidInput as error:
+        raise error.at(str(folder / "blocks.json")) from None
     return Style(sheet, blocks, pictures)
 
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from math import isfinite, nan
-
 import click
 
-from ._options import FiniteRange, output
+from ._options import FiniteRange, finite, output
 
 
 def _count(_: click.Context, parameter: click.Parameter, value: str) -> int | None:
@@ -19,12 +17,9 @@ def _count(_: click.Context, parameter: click.Parameter, value: str) -> int | No
 
 def _azimuth(_: click.Context, parameter: click.Parameter, value: str) -> float | None:
     try:
-        degrees = None if value == "auto" else float(value)
+        return None if value == "auto" else finite(value)
     except ValueError:
-        degrees = nan
-    if degrees is not None and not isfinite(degrees):
-        raise click.BadParameter("expected degrees, or auto", param=parameter)
-    return degrees
+        raise click.BadParameter("expected degrees, or auto", param=parameter) from None
 
 
 @click.command()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import click
@@ -72,10 +71,11 @@ def command(
 def _known(path: str) -> Any:
     """Return a partial building; raises InvalidInput where its boxes break a rule of geometry."""
     from facade_tools.artifacts.store import read_one
-    from facade_tools.geometry.checks import building_problems
+    from facade_tools.exteriors.kept import check_kept
 
     known = read_one(path, "building")
-    for problem in building_problems(replace(known, facades={})):
-        if problem.pointer.startswith("/boxes/"):
-            raise InvalidInput(problem.message, pointer=problem.pointer).at(path)
+    try:
+        check_kept(known)
+    except InvalidInput as error:
+        raise error.at(path) from None
     return known

@@ -18,7 +18,7 @@ from facade_tools.grammar.extents import needed_sizes
 from facade_tools.grammar.library import builtin, builtin_names, load
 from facade_tools.grammar.plan import plan
 from facade_tools.grammar.sampling import sample_derivation
-from facade_tools.grammar.segments import Bounds, Moves, best_cut, size_cost
+from facade_tools.grammar.segments import Bounds, Moves, best_cut
 
 BUILTIN = builtin_names()
 
@@ -72,6 +72,11 @@ def random_problem(seed, states=3, length=7, widest=5):
     weight = rng.random(states) < rng.choice([0.0, 0.5, 1.0])
     prior = np.column_stack([rng.uniform(1, 4, states), rng.uniform(0, 1, states), weight])
     return rng.random((states, length)), machine, Bounds(least, most, prior)
+
+
+def size_cost(limits, state, length):
+    typical, steep, weight = limits.prior[state]
+    return weight * ((length - typical) * steep) ** 2 / 2
 
 
 def brute_force(costs, machine, limits):

@@ -10,8 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from test_stylization import BOX, style_of, textured_box
 
 from facade_tools.artifacts.blocks import Block, Blocks
@@ -25,20 +23,17 @@ from facade_tools.stylization.bases import layout_blocks, with_ends
 from facade_tools.stylization.bays import with_bays
 from facade_tools.stylization.capture import capture_style
 from facade_tools.stylization.drawing import sheet_picture
-from facade_tools.stylization.hull import layers, mass
 from facade_tools.stylization.model import CaptureOptions
-from facade_tools.stylization.panels import panels, reassigned, rectangles
+from facade_tools.stylization.panels import panels, reassigned
 from facade_tools.stylization.placing import (
     foreign_blocks,
     matched_blocks,
     placed_blocks,
     placed_slabs,
 )
-from facade_tools.stylization.remesh import Slab
 from facade_tools.stylization.resizing import resized
 from facade_tools.stylization.retarget import retarget
 from facade_tools.stylization.style import Style
-from facade_tools.stylization.wings import wings
 
 SAMPLES = Path(__file__).parent.parent / "sample_data" / "textured"
 NAMES = sorted(path.name for path in SAMPLES.iterdir())
@@ -78,68 +73,6 @@ def test_sample_buildings_have_the_structure_they_were_drawn_with(styles):
     assert roles["u-court"] == ["bottom"] * 3 + ["body"] * 3
     assert volume(styles["l-block"].blocks) == pytest.approx((33 * 11 + 12 * 16) * 18)
     assert volume(styles["u-court"].blocks) == pytest.approx((40 * 12 + 2 * 11 * 16) * 13)
-
-
-def plan(*rows):
-    cells = np.array([[c == "#" for c in row] for row in rows])
-    return Slab(
-        0.0, 9.0, np.arange(cells.shape[1] + 1) * 4.0, np.arange(len(rows) + 1) * 4.0, cells
-    )
-
-
-@pytest.mark.parametrize(
-    ("rows", "count"),
-    [
-        (("####", "####"), 1),
-        (("####", "#..."), 2),  # L
-        (("####", ".#.."), 2),  # T
-        (("####", "#..#"), 3),  # U
-        (("####", "#..#", "####"), 4),  # court
-        (("#..#", "####", "#..#"), 3),  # H, whose bars are wings of the middle
-    ],
-)
-def test_plans_become_wings(rows, count):
-    slab = plan(*rows)
-    _, _, labels = wings([slab])
-    if rows[0] == "#..#":
-        assert len(np.unique(labels[slab.cells])) >= count
-    else:
-        assert len(np.unique(labels[slab.cells])) == count
-
-
-@given(st.integers(0, 2**16 - 1))
-def test_wings_share_out_every_cell(bits):
-    cells = np.array([[bits >> (4 * r + c) & 1 for c in range(4)] for r in range(4)], dtype=bool)
-    if not cells.any():
-        return
-    slab = Slab(0.0, 9.0, np.arange(5.0), np.arange(5.0), cells)
-    xs, ys, labels = wings([slab])
-    assert labels.shape == (len(ys) - 1, len(xs) - 1)
-
-
-@given(st.integers(0, 2**20 - 1))
-def test_rectangles_tile_a_mask(bits):
-    mask = np.array([[bits >> (5 * r + c) & 1 for c in range(5)] for r in range(4)], dtype=bool)
-    count = np.zeros(mask.shape, dtype=int)
-    for row, end, a, b in rectangles(mask):
-        count[row:end, a:b] += 1
-    assert (count == mask).all()
-
-
-@settings(max_examples=40, deadline=None)
-@given(st.integers(0, 2**27 - 1))
-def test_any_stack_of_cells_is_a_closed_solid(bits):
-    cells = np.array([bits >> k & 1 for k in range(27)], dtype=bool).reshape(3, 3, 3)
-    slabs = [
-        Slab(3.0 * z, 3.0 * z + 3, np.array([0.0, 2, 5, 6]), np.array([0.0, 3, 4, 8]), cells[z])
-        for z in range(3)
-        if cells[z].any()
-    ]
-    if not slabs:
-        return
-    body = mass(layers(slabs), "mass")
-    assert closed(body)
-    assert solid_volume(body) == pytest.approx(sum(s.area * s.height for s in slabs), rel=1e-3)
 
 
 # --- onto itself, and onto others -----------------------------------------------------------------
@@ -470,86 +403,3 @@ def test_niches_in_the_plan_are_repeated_and_keep_their_width(factor, count):
     assert closed(scene.meshes[0])
     front = next(m for m in scene.meshes if m.name == f"{block.id}/front")
     assert wall_area(front) == pytest.approx(18 * factor * 6, rel=0.01)
-
-
-# --- the command ----------------------------------------------------------------------------------
-BLOCK = {
-    "id": "a", "role": "body", "x": 0, "y": 0, "z": 0, "width": 18, "depth": 9, "height": 9,
-    "floors": 3,
-}  # fmt: skip
-
-
-def base_file(path, identity="b", blocks=(BLOCK,), **more):
-    document = {"schema": "facade-tools/blocks/1", "id": identity, "blocks": list(blocks), **more}
-    path.write_text(json.dumps(document))
-    return path
-
-
-@pytest.fixture
-def sheet(styles, tmp_path):
-    style = styles["l-block"]
-    (tmp_path / "style").mkdir()
-    write_style(tmp_path / "style", style.sheet, style.blocks, style.pictures)
-    return tmp_path / "style"
-
-
-def test_several_bases_into_one_file_are_refused_before_any_work(facade_here, sheet, tmp_path):
-    bases = [base_file(tmp_path / f"{name}.json", name) for name in "ab"]
-    done = facade_here("retarget", sheet, *bases, "-o", tmp_path / "x" / "one.glb")
-    assert done.returncode == 2
-    assert "several bases; name a folder" in done.stderr.decode()
-    assert not (tmp_path / "x").exists()
-
-
-def test_ids_that_are_one_file_name_are_refused(facade_here, sheet, tmp_path):
-    bases = [base_file(tmp_path / f"{k}.json", name) for k, name in enumerate(["a/b", "a_b"])]
-    done = facade_here("retarget", sheet, *bases, "-o", tmp_path / "out")
-    assert done.returncode == 3
-    assert "id 'a_b' stands twice" in done.stderr.decode()
-
-
-def test_meshes_of_one_folder_are_named_by_their_files(facade_here, sheet, tmp_path):
-    for name in ("d/one.obj", "d/two.obj", "e/model.obj", "here.obj"):
-        path = tmp_path / name
-        path.parent.mkdir(exist_ok=True)
-        path.write_bytes((SAMPLES / "l-block" / "model.obj").read_bytes())
-    words = ("retarget", sheet, "d/one.obj", "d/two.obj", "e/model.obj", "here.obj")
-    done = facade_here(*words, "-o", tmp_path / "out", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    made = sorted(path.name for path in (tmp_path / "out").iterdir())
-    assert made == ["e.glb", "here.glb", "one.glb", "two.glb"]
-
-
-SINGULAR = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 0], [0, 0, 0, 1]]
-PROJECTIVE = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0.1, 0, 0, 1]]
-
-
-@pytest.mark.parametrize(
-    ("more", "expected"),
-    [
-        ({"frame": SINGULAR}, "/frame: is singular"),
-        ({"frame": PROJECTIVE}, "/frame: is singular or projective"),
-        ({"blocks": [BLOCK, BLOCK | {"x": 20}]}, "/blocks/1/id: id 'a' stands twice"),
-    ],
-)
-def test_bases_are_checked(facade_here, sheet, tmp_path, more, expected):
-    base = base_file(tmp_path / "b.json", **more)
-    done = facade_here("retarget", sheet, base, "-o", tmp_path / "x.glb")
-    assert done.returncode == 3
-    assert f"{base}: {expected}" in done.stderr.decode()
-    assert not (tmp_path / "x.glb").exists()
-    assert expected in facade_here("validate", base).stdout.decode()
-
-
-def test_bad_bases_are_skipped_if_asked(facade_here, sheet, tmp_path):
-    bases = [
-        base_file(tmp_path / "bad.json", "bad", frame=SINGULAR),
-        base_file(tmp_path / "good.json", "good"),
-    ]
-    out = tmp_path / "out"
-    assert facade_here("retarget", sheet, *bases, "-o", out).returncode == 3
-    assert not out.exists()
-    done = facade_here("retarget", sheet, *bases, "-o", out, "--on-error", "skip")
-    assert done.returncode == 3
-    assert "1 bad items were skipped" in done.stderr.decode()
-    assert [path.name for path in out.iterdir()] == ["good.glb"]

@@ -12,6 +12,7 @@ from typing import Any, ClassVar, Protocol
 from ..errors import InvalidInput, Place
 from .codec import from_json, to_json
 from .numbers import parse_float
+from .pointers import escaped
 from .validation import check
 
 # Kind of artifact -> module and class. The modules load when an artifact of the kind does.
@@ -84,8 +85,7 @@ def check_finite(value: Any, pointer: str = "") -> None:
     if isinstance(value, dict | list):
         rows = value.items() if isinstance(value, dict) else enumerate(value)
         for key, item in rows:
-            part = str(key).replace("~", "~0").replace("/", "~1")
-            check_finite(item, f"{pointer}/{part}")
+            check_finite(item, f"{pointer}/{escaped(str(key))}")
 
 
 @cache

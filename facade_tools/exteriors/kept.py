@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..artifacts.building import SIDES, Building, Element, Piece, Side
-from ..errors import Infeasible
+from ..errors import Infeasible, InvalidInput
 from ..geometry.blocked import wall_of
-from ..geometry.checks import element_rectangles, overlaps
+from ..geometry.checks import building_problems, element_rectangles, overlaps
 
 NEAR = 1e-3  # what is closer than this is in the same place (m)
 
@@ -45,6 +45,13 @@ def standing_sides(
         sides.append(Standing(side, placed, full))
     _refuse_contradictions(sides)
     return sides
+
+
+def check_kept(keep: Building) -> None:
+    """Raise InvalidInput, with the pointer, where a box of a partial breaks a rule of geometry."""
+    for problem in building_problems(replace(keep, facades={})):
+        if problem.pointer.startswith("/boxes/"):
+            raise InvalidInput(problem.message, pointer=problem.pointer)
 
 
 def _refuse_contradictions(sides: Sequence[Standing]) -> None:

@@ -50,12 +50,12 @@ def hidden(porch: Box, solid: Sequence[Box]) -> bool:
     own = box_rectangles(solid)
     width = np.minimum(own[:, 2], x1) - np.maximum(own[:, 0], x0)
     depth = np.minimum(own[:, 3], y1) - np.maximum(own[:, 1], y0)
-    area, most = porch.width * porch.depth, HIDDEN * porch.width * porch.depth
+    most = HIDDEN * porch.width * porch.depth
     if float((np.maximum(width, 0.0) * np.maximum(depth, 0.0)).sum()) < most:
         return False
     clipped = np.column_stack([np.maximum(own[:, :2], (x0, y0)), np.minimum(own[:, 2:], (x1, y1))])
     inside = clipped[(width > 0) & (depth > 0)]
-    return area > 0 and float(area_perimeter(inside)[0]) >= most
+    return most > 0 and float(area_perimeter(inside)[0]) >= most
 
 
 def _before(porch: Box, solid: Sequence[Box]) -> Box | None:

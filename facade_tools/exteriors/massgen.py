@@ -29,7 +29,7 @@ from .mass_roofs import (
     with_tower,
 )
 from .mass_search import new_pool, pooled
-from .relations import DEFAULT_STOREY
+from .relations import states_storeys
 
 log = logging.getLogger("facade_tools.massgen")
 
@@ -72,7 +72,7 @@ def generate_mass(
     model: attributes that `keep` contradicts are drawn from it anew, given the others.
     `energy.residuals` names the groups that the result misses.
     """
-    if keep is not None and (keep.facades or keep.storey_height != DEFAULT_STOREY):
+    if keep is not None and (keep.facades or states_storeys(keep)):
         attributes = replace(attributes, storey_height=keep.storey_height)
     target = search_target(attributes, keep, rng=rng)
     masses = find_masses(target, keep, candidates, rng=rng)

@@ -13,11 +13,12 @@ from math import sqrt
 from typing import NamedTuple
 
 from ..artifacts.attributes import Attributes, MassAttributes, Number
+from ..artifacts.building import Building
 from .groups import PART
 
 ROUNDED = 1e-3  # numbers that people state are rounded
 MOST_FLOORS = 3
-DEFAULT_STOREY = 3.0  # m, what a file says that says nothing
+DEFAULT_STOREY = Attributes("").storey_height  # m, what a file says that says nothing
 SQUARE = 4.0  # bdry of a square: no rectilinear plan has less
 PORCHES = ("front", "back")
 
@@ -62,8 +63,8 @@ def _third(arf: tuple[Number, ...]) -> tuple[Number, ...]:
     return first, second, third
 
 
-def states_storeys(row: Attributes) -> bool:
-    """Tell whether a row states its storey height; the default, 3 m, counts as not stated."""
+def states_storeys(row: Attributes | Building) -> bool:
+    """Tell whether a storey height is stated; the default, 3 m, counts as not stated."""
     return row.storey_height != DEFAULT_STOREY
 
 
@@ -73,7 +74,7 @@ def contradictions(row: Attributes) -> Iterator[Contradiction]:
     Sums and products are compared as far as people round (0.001).
     """
     mass, filled = row.mass, completed(row).mass
-    yield from _floor_contradictions(filled, mass)
+    yield from _floor_contradictions(filled)
     yield from _boundary_contradictions(filled)
     yield from _part_contradictions("/mass/garage", filled.garage)
     yield from _garage_contradictions(mass)
@@ -95,10 +96,8 @@ def contradictions(row: Attributes) -> Iterator[Contradiction]:
         yield Contradiction("/element/roof", "no kind of roof; expected at least one 1")
 
 
-def _floor_contradictions(
-    filled: MassAttributes, stated: MassAttributes
-) -> Iterator[Contradiction]:
-    bcr, far, arf = filled.bcr, filled.far, filled.arf
+def _floor_contradictions(mass: MassAttributes) -> Iterator[Contradiction]:
+    bcr, far, arf = mass.bcr, mass.far, mass.arf
     for i, least in enumerate((1 / MOST_FLOORS, 0.0, 0.0)):
         share = arf[i]
         if share is not None and not least - ROUNDED <= share <= 1 / (i + 1) + ROUNDED:
@@ -116,8 +115,8 @@ def _floor_contradictions(
         elif arf[0] is not None and abs(far * arf[0] - bcr) > ROUNDED * max(1.0, far):
             message = f"{far:g}; far · arf₀ = {far * arf[0]:.4g}, but bcr is {bcr:.4g}"
             yield Contradiction("/mass/far", message)
-    elif stated.far is not None and stated.far > MOST_FLOORS:
-        yield Contradiction("/mass/far", f"{stated.far:g}; expected at most {MOST_FLOORS}")
+    elif far is not None and far > MOST_FLOORS:
+        yield Contradiction("/mass/far", f"{far:g}; expected at most {MOST_FLOORS}")
 
 
 def _boundary_contradictions(mass: MassAttributes) -> Iterator[Contradiction]:

@@ -84,14 +84,8 @@ def bounds(sizes: tuple[Size, ...], unit: float, length: int) -> Bounds:
     )
 
 
-def size_cost(limits: Bounds, state: int, length: int) -> float:
-    """Return the prior energy of a part's length: weight · ((length − typical) / spread)² / 2."""
-    typical, steep, weight = limits.prior[state]
-    return float(weight * ((length - typical) * steep) ** 2 / 2)
-
-
 def prior_cost(limits: Bounds, cut: Cut) -> float:
-    """Return the prior energy of all lengths of a cutting."""
+    """Return Σ weight · ((length − typical) / spread)² / 2, the prior energy of all lengths."""
     typical, steep, weight = limits.prior[list(cut.states)].T
     return float(np.sum(weight * ((np.diff(cut.bounds) - typical) * steep) ** 2 / 2))
 

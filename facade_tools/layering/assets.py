@@ -15,7 +15,7 @@ from ..artifacts.layout import Layout
 from ..artifacts.pointers import escaped
 from ..errors import InvalidInput
 from ..geometry.arrays import Floats, Points3, Triangles
-from .stack import stack_of
+from .stack import shape_tables, stack_of
 
 MESH = "model/obj"
 MEDIA = {".obj": MESH, ".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg"}
@@ -49,11 +49,7 @@ def named_assets(design: Design) -> Iterator[tuple[str, str]]:
 
 
 def _looks(design: Design) -> Iterator[tuple[str, Appearance]]:
-    stack = stack_of(design)
-    tables: list[tuple[str, Mapping[str, Appearance]]] = [("/shapes", design.shapes)]
-    tables += [(f"/layers/{i}/shapes", layer.shapes) for i, layer in enumerate(design.layers)]
-    tables += [(f"/patterns/{escaped(n)}/shapes", p.shapes) for n, p in stack.patterns.items()]
-    for pointer, table in tables:
+    for pointer, table in shape_tables(stack_of(design)):
         for key, look in table.items():
             yield f"{pointer}/{escaped(key)}", look
 

@@ -235,12 +235,18 @@ def _children(node: Any) -> tuple[Node, ...]:
     return (node.base,)
 
 
+def shape_tables(stack: Stack) -> Iterator[tuple[str, Mapping[str, Appearance]]]:
+    """Yield pointer and content of every table of shapes: the design's, of layers, of patterns."""
+    yield "/shapes", stack.design.shapes
+    for i, layer in enumerate(stack.design.layers):
+        yield f"/layers/{i}/shapes", layer.shapes
+    for name, pattern in stack.patterns.items():
+        yield f"/patterns/{escaped(name)}/shapes", pattern.shapes
+
+
 def _check_shapes(stack: Stack) -> None:
     known = set(stack.design.symbols)
-    tables: list[tuple[str, Mapping[str, Appearance]]] = [("/shapes", stack.design.shapes)]
-    tables += [(f"/layers/{i}/shapes", la.shapes) for i, la in enumerate(stack.design.layers)]
-    tables += [(f"/patterns/{escaped(n)}/shapes", p.shapes) for n, p in stack.patterns.items()]
-    for pointer, table in tables:
+    for pointer, table in shape_tables(stack):
         for key in table:
             place = f"{pointer}/{escaped(key)}"
             try:

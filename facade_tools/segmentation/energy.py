@@ -186,12 +186,7 @@ def energy(field: Field, plan: Plan, layout: Layout) -> float:
             total += float(field.cost[field.label[labels[kind]], low:high, left:right].sum())
         if layout.owner[i] not in used:
             used.add(layout.owner[i])
-            total += column_prior(plan, field, plan.states[number].group, cut)
+            group = plan.states[number].group
+            assert group is not None  # a row with columns has their group
+            total += prior_cost(column_limits(plan, field, group), cut)
     return total
-
-
-def column_prior(plan: Plan, field: Field, group: int | None, cut: Cut) -> float:
-    """Return the prior energy of the widths of one set of columns."""
-    if group is None:
-        return 0.0
-    return prior_cost(column_limits(plan, field, group), cut)

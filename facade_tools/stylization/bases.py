@@ -11,6 +11,7 @@ import numpy as np
 from ..artifacts.blocks import Block, BlockRole, Blocks
 from ..artifacts.building import Box, Building
 from ..artifacts.layout import Layout
+from ..errors import InvalidInput
 from ..formats.textured import TexturedMesh
 from ..geometry.arrays import Floats
 from .model import CaptureOptions, modelled
@@ -164,6 +165,12 @@ def blocks_problems(blocks: Blocks) -> Iterator[tuple[str, str]]:
         seen.add(block.id)
     if blocks.frame is not None and not _is_frame(np.array(blocks.frame, dtype=np.float64)):
         yield "/frame", "is singular or projective; expected an invertible affine 4×4 matrix"
+
+
+def check_blocks(blocks: Blocks) -> None:
+    """Raise InvalidInput, with the pointer, on the first of the problems of blocks."""
+    for pointer, message in blocks_problems(blocks):
+        raise InvalidInput(message, pointer=pointer)
 
 
 def _is_frame(matrix: Floats) -> bool:

@@ -1,0 +1,97 @@
+"""The command retarget: bases checked, named and skipped."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from facade_tools.formats.mesh_reader import read_textured
+from facade_tools.formats.style_folder import write_style
+from facade_tools.stylization.capture import capture_style
+from facade_tools.stylization.model import CaptureOptions
+
+SAMPLES = Path(__file__).parent.parent / "sample_data" / "textured"
+
+BLOCK = {
+    "id": "a", "role": "body", "x": 0, "y": 0, "z": 0, "width": 18, "depth": 9, "height": 9,
+    "floors": 3,
+}  # fmt: skip
+
+
+def base_file(path, identity="b", blocks=(BLOCK,), **more):
+    document = {"schema": "facade-tools/blocks/1", "id": identity, "blocks": list(blocks), **more}
+    path.write_text(json.dumps(document))
+    return path
+
+
+@pytest.fixture(scope="module")
+def sheet(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("style")
+    mesh = read_textured(SAMPLES / "l-block" / "model.obj")
+    capture = capture_style(mesh, "l-block", CaptureOptions())
+    write_style(folder, capture.sheet, capture.blocks, capture.pictures)
+    return folder
+
+
+def test_several_bases_into_one_file_are_refused_before_any_work(facade_here, sheet, tmp_path):
+    bases = [base_file(tmp_path / f"{name}.json", name) for name in "ab"]
+    done = facade_here("retarget", sheet, *bases, "-o", tmp_path / "x" / "one.glb")
+    assert done.returncode == 2
+    assert "several bases; name a folder" in done.stderr.decode()
+    assert not (tmp_path / "x").exists()
+
+
+def test_ids_that_are_one_file_name_are_refused(facade_here, sheet, tmp_path):
+    bases = [base_file(tmp_path / f"{k}.json", name) for k, name in enumerate(["a/b", "a_b"])]
+    done = facade_here("retarget", sheet, *bases, "-o", tmp_path / "out")
+    assert done.returncode == 3
+    assert "id 'a_b' stands twice" in done.stderr.decode()
+
+
+def test_meshes_of_one_folder_are_named_by_their_files(facade_here, sheet, tmp_path):
+    for name in ("d/one.obj", "d/two.obj", "e/model.obj", "here.obj"):
+        path = tmp_path / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes((SAMPLES / "l-block" / "model.obj").read_bytes())
+    words = ("retarget", sheet, "d/one.obj", "d/two.obj", "e/model.obj", "here.obj")
+    done = facade_here(*words, "-o", tmp_path / "out", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    made = sorted(path.name for path in (tmp_path / "out").iterdir())
+    assert made == ["e.glb", "here.glb", "one.glb", "two.glb"]
+
+
+SINGULAR = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 0], [0, 0, 0, 1]]
+PROJECTIVE = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0.1, 0, 0, 1]]
+
+
+@pytest.mark.parametrize(
+    ("more", "expected"),
+    [
+        ({"frame": SINGULAR}, "/frame: is singular"),
+        ({"frame": PROJECTIVE}, "/frame: is singular or projective"),
+        ({"blocks": [BLOCK, BLOCK | {"x": 20}]}, "/blocks/1/id: id 'a' stands twice"),
+    ],
+)
+def test_bases_are_checked(facade_here, sheet, tmp_path, more, expected):
+    base = base_file(tmp_path / "b.json", **more)
+    done = facade_here("retarget", sheet, base, "-o", tmp_path / "x.glb")
+    assert done.returncode == 3
+    assert f"{base}: {expected}" in done.stderr.decode()
+    assert not (tmp_path / "x.glb").exists()
+    assert expected in facade_here("validate", base).stdout.decode()
+
+
+def test_bad_bases_are_skipped_if_asked(facade_here, sheet, tmp_path):
+    bases = [
+        base_file(tmp_path / "bad.json", "bad", frame=SINGULAR),
+        base_file(tmp_path / "good.json", "good"),
+    ]
+    out = tmp_path / "out"
+    assert facade_here("retarget", sheet, *bases, "-o", out).returncode == 3
+    assert not out.exists()
+    done = facade_here("retarget", sheet, *bases, "-o", out, "--on-error", "skip")
+    assert done.returncode == 3
+    assert "1 bad items were skipped" in done.stderr.decode()
+    assert [path.name for path in out.iterdir()] == ["good.glb"]

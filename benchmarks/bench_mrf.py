@@ -1,7 +1,7 @@
-"""`parse-image --method mrf` on real facades: rows, columns, window boxes, pixels, time, memory.
+"""`parse-image` without training on the data: rows, columns, window boxes, pixels, time, memory.
 
-    python benchmarks/bench_mrf.py DATA [--convention ecp|cmp] [--step N] [--sheet PNG]
-    python benchmarks/bench_mrf.py DATA --forest default|NPZ        the trained method instead
+    python benchmarks/bench_mrf.py DATA [--convention ecp|cmp] [--step N] [--start K] [--sheet PNG]
+    python benchmarks/bench_mrf.py DATA --method forest|both [--classifier NPZ]
 
 DATA holds images/ and labels/. Pictures whose windows are no grid (less than 90% of the cells of
 rows × columns hold one) are counted apart.
@@ -35,9 +35,16 @@ from facade_tools.segmentation.parsing import forest_method
 WINDOW, WALL = LABELS.index("window"), LABELS.index("wall")
 
 
-def pairs(data, kind, step):
+METHODS = {
+    "forest": forest_method,
+    "mrf": mrf_method,
+    "both": lambda options: forest_method(options, second=mrf_method(options)),
+}
+
+
+def pairs(data, kind, start, step):
     known = convention(kind)
-    for path in sorted((data / "images").iterdir())[::step]:
+    for path in sorted((data / "images").iterdir())[start::step]:
         if path.suffix.lower() in PICTURES:
             labels = known.read(str(data / "labels" / f"{path.stem}.png"))
             yield path.stem, read_photo(str(path)), labels
@@ -77,15 +84,15 @@ def main():
     parser.add_argument("--step", type=int, default=1, help="every N-th picture")
     parser.add_argument("--sheet", type=Path, help="overlays of the first 24 pictures")
     parser.add_argument("--bad", action="store_true", help="name what is wrong; sheet shows these")
-    parser.add_argument("--forest", help="measure this classifier with the default grammar")
+    parser.add_argument("--start", type=int, default=0, help="the first picture")
+    parser.add_argument("--method", choices=list(METHODS), default="mrf")
+    parser.add_argument("--classifier", help="of forest and both; the shipped one without it")
     args = parser.parse_args()
     cv2.setNumThreads(1)
-    read = mrf_method(ReadOptions())
-    if args.forest:
-        read = forest_method(ReadOptions(None if args.forest == "default" else args.forest))
+    read = METHODS[args.method](ReadOptions(args.classifier))
     every, grid, tiles, times = Tally(), Tally(), [], []
     right = whole = constant = 0
-    for name, photo, truth in pairs(args.data, args.convention, args.step):
+    for name, photo, truth in pairs(args.data, args.convention, args.start, args.step):
         start = time.process_time()
         reading = read(photo, name, rng=np.random.default_rng(0))
         times.append(time.process_time() - start)
@@ -108,6 +115,7 @@ def main():
         )
     print(f"constant answer 6 rows: {constant / max(every.pictures, 1):.3f}")
     print(f"window/wall pixels right: {right / max(whole, 1):.4f}")
+    print(f"all pixels right: {every.accuracy(True):.4f}, mean IoU {every.mean_iou(True):.3f}")
     print(f"CPU s an image: median {np.median(times):.3f}, most {max(times[1:], default=0):.3f}")
     print(f"peak memory: {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MiB")
     if args.sheet and tiles:

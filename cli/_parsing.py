@@ -137,6 +137,14 @@ def _read_options(options: ParseOptions) -> ReadOptions:
     )
 
 
+def both_methods(options: ReadOptions) -> Method:
+    """Return TSKP10's method with KSTTP09's windows as a second opinion."""
+    from facade_tools.reconstruction.mrf import mrf_method
+    from facade_tools.segmentation.parsing import forest_method
+
+    return forest_method(options, second=mrf_method(options))
+
+
 @lru_cache(maxsize=1)
 def _method(name: str, options: ReadOptions) -> Method:
     method: Method = load(METHODS[name])(options)
@@ -191,7 +199,11 @@ def run_parse(stream: StreamOptions, options: ParseOptions) -> None:
     faults.complain()
 
 
-FOREIGN = {"forest": ("height", "storey_height"), "mrf": ("classifier", "grammar", "solver")}
+FOREIGN = {
+    "forest": ("height", "storey_height"),
+    "mrf": ("classifier", "grammar", "solver"),
+    "both": (),
+}
 
 
 def _refuse_foreign(options: ParseOptions) -> None:

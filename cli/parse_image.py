@@ -11,6 +11,7 @@ from ._options import FiniteRange, StreamOptions, stream_options
 # Method -> function(ReadOptions) that returns a Method (facade_tools.grammar.reading); it loads
 # when it is called for.
 METHODS = {
+    "both": f"{__package__}._parsing:both_methods",
     "forest": "facade_tools.segmentation.parsing:forest_method",
     "mrf": "facade_tools.reconstruction.mrf:mrf_method",
 }
@@ -25,22 +26,23 @@ METHODS = {
     "[default: haussmann-floors]",
 )  # fmt: skip
 @click.option(
-    "--method", type=click.Choice(list(METHODS)), default="forest", show_default=True,
+    "--method", type=click.Choice(list(METHODS)),
     help="forest: trees over pixels and a split grammar (TSKP10); mrf: chains of floors and of "
-    "window stripes, nothing learned (KSTTP09).",
+    "window stripes, nothing learned (KSTTP09); both: forest, with the windows of mrf as far as "
+    "the trees doubt.  [default: both; with --classifier: forest]",
 )  # fmt: skip
 @click.option(
     "--solver", type=click.Choice(["dp", "walk"]),
-    help="forest: dp, exact in turn over rows and columns; walk, the paper's random walk.  "
+    help="forest, both: dp, exact in turn over rows and columns; walk, the paper's random walk.  "
     "[default: dp]",
 )  # fmt: skip
 @click.option(
     "--height", type=FiniteRange(1, 1000), metavar="M",
-    help="mrf: height of the building to the top of its roof, metres.  [default: unknown]",
+    help="mrf, both: height of the building to the top of its roof, metres.  [default: unknown]",
 )  # fmt: skip
 @click.option(
     "--storey-height", type=FiniteRange(1, 20), metavar="M",
-    help="mrf: height of a storey, metres.  [default: unknown; taken to be 3]",
+    help="mrf, both: height of a storey, metres.  [default: unknown; taken to be 3]",
 )  # fmt: skip
 @click.option(
     "--rectify", metavar="auto|X,Y X,Y X,Y X,Y|REPORT",
@@ -64,4 +66,5 @@ def command(stream: StreamOptions, **values: Any) -> None:
     """
     from ._parsing import ParseOptions, run_parse
 
+    values["method"] = values["method"] or ("forest" if values["classifier"] else "both")
     run_parse(stream, ParseOptions(**values))

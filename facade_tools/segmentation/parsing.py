@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..artifacts.parse import LABELS, ImageInfo, Parse
-from ..errors import InvalidInput
+from ..errors import Infeasible, InvalidInput
 from ..grammar.derivation import painted
 from ..grammar.library import DEFAULT
 from ..grammar.library import load as load_grammar
@@ -28,6 +28,7 @@ from .classifier import load as load_classifier
 from .deriving import Frame, floors_of, regions_of, with_confidence
 from .energy import check_labels, field_of
 from .finishing import finished
+from .second_opinion import moved
 
 PLAIN = "plain"  # the shipped grammar of the fewest labels
 PROBE = 32  # pixels a side
@@ -36,12 +37,16 @@ IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 @dataclass(frozen=True, slots=True)
 class Reader:
-    """Everything that reading a picture needs, the same for all pictures."""
+    """Everything that reading a picture needs, the same for all pictures.
+
+    second: another method whose windows count as far as the classifier doubts.
+    """
 
     classifier: Classifier
     plan: Plan
     solver: str = "dp"
     name: str = "default"
+    second: Method | None = None
 
 
 Solver = Callable[..., dp.Solution]  # of a field and a plan, with rng
@@ -52,13 +57,16 @@ SOLVERS: Mapping[str, Solver] = {
 }
 
 
-def forest_method(options: ReadOptions) -> Method:
-    """Return the method of TSKP10: a classifier believes, a grammar explains."""
+def forest_method(options: ReadOptions, second: Method | None = None) -> Method:
+    """Return the method of TSKP10: a classifier believes, a grammar explains.
+
+    second: another method, whose windows count as far as the classifier doubts.
+    """
     classifier = default() if options.classifier is None else load_classifier(options.classifier)
     name = "default" if options.classifier is None else Path(options.classifier).name
     plan = compiled_plan(options.grammar or DEFAULT)
     _check_fit(classifier, plan, options)
-    return partial(read_facade, Reader(classifier, plan, options.solver, name))
+    return partial(read_facade, Reader(classifier, plan, options.solver, name, second))
 
 
 def _check_fit(classifier: Classifier, plan: Plan, options: ReadOptions) -> None:
@@ -107,6 +115,9 @@ def read_facade(
     belief = reader.classifier.probabilities(working)
     shape = photo.pixels.shape[:2]
     raw = raw_labels(belief, reader.classifier.classes, shape)
+    other = _second_reading(reader.second, photo, identity, rng, mask)
+    if other is not None:
+        belief = moved(belief, reader.classifier.classes, other.labels)
     hidden = _hidden(mask, working.shape[:2], shape)
     belief = np.where(hidden, np.float32(1), belief)
     field = field_of(belief, reader.classifier.classes, reader.plan)
@@ -122,7 +133,7 @@ def read_facade(
         id=identity,
         image=ImageInfo(photo.name, (shape[1], shape[0]), photo.sha256),
         rectification=IDENTITY,
-        method="forest",
+        method="forest" if reader.second is None else "both",
         solver=reader.solver,
         grammar=reader.plan.grammar.id,
         classifier=reader.name,
@@ -135,8 +146,25 @@ def read_facade(
         optimal=solution.optimal,
         trace=solution.trace,
         derivation=tree,
+        tags={} if other is None else other.parse.tags,
     )
     return Reading(parse, painted(tree, shape, label_index()), raw)
+
+
+def _second_reading(
+    second: Method | None,
+    photo: Photo,
+    identity: str,
+    rng: np.random.Generator,
+    mask: NDArray[np.bool_] | None,
+) -> Reading | None:
+    """Return what another method reads: nothing where there is none, or no solution of its own."""
+    if second is None:
+        return None
+    try:
+        return second(photo, identity, rng=rng, mask=mask)
+    except Infeasible:
+        return None
 
 
 def raw_labels(

@@ -1,0 +1,119 @@
+"""A second reading of a photograph: it moves windows as far as the classifier doubts."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from facade_tools.artifacts.parse import LABELS
+from facade_tools.errors import Infeasible
+from facade_tools.grammar.library import builtin
+from facade_tools.grammar.reading import ReadOptions
+from facade_tools.imaging.image_io import Photo
+from facade_tools.reconstruction.mrf import mrf_method
+from facade_tools.segmentation.classifier import default, save
+from facade_tools.segmentation.painting import render_facade
+from facade_tools.segmentation.parsing import forest_method
+from facade_tools.segmentation.second_opinion import WEIGHT, moved
+
+CLASSES = ("window", "wall", "sky")
+WINDOW, WALL = LABELS.index("window"), LABELS.index("wall")
+
+
+def beliefs(window, wall, sky, shape=(4, 6)):
+    each = np.array([window, wall, sky], np.float32)
+    return np.tile(each[:, None, None], (1, *shape))
+
+
+def half(shape=(4, 6)):
+    labels = np.full(shape, WALL, np.uint8)
+    labels[:, : shape[1] // 2] = WINDOW
+    return labels
+
+
+def test_a_lost_classifier_takes_the_whole_weight():
+    out = moved(beliefs(0.4, 0.4, 0.2), CLASSES, half())
+    odds = np.log(out[0] / out[1])
+    np.testing.assert_allclose(odds[:, :3], 2 * WEIGHT, rtol=1e-5)
+    np.testing.assert_allclose(odds[:, 3:], -2 * WEIGHT, rtol=1e-5)
+    np.testing.assert_allclose(out.sum(axis=0), 1, rtol=1e-5)
+
+
+def test_a_sure_classifier_is_not_moved():
+    sure = beliefs(0.97, 0.02, 0.01)
+    np.testing.assert_allclose(moved(sure, CLASSES, half()), sure, rtol=1e-6)
+
+
+def test_between_the_weight_grows_with_doubt():
+    """Mean entropies of 0.35 and 0.44 nats stand between sure and lost."""
+    shifts = []
+    for p in (0.90, 0.87):
+        out = moved(beliefs(p, 1 - p - 0.01, 0.01), CLASSES, half())
+        shifts.append(np.log(out[0, 0, 0] / out[1, 0, 0]) - np.log(p / (1 - p - 0.01)))
+    assert 0 < shifts[0] < shifts[1] < 2 * WEIGHT
+
+
+def test_labels_of_another_size_and_a_missing_class():
+    out = moved(beliefs(0.4, 0.4, 0.2)[:2], ("window", "sky"), half((40, 60)))
+    assert (out[0, :, :3] > 0.5).all()
+    assert (out[0, :, 3:] < 0.5).all()
+    np.testing.assert_allclose(out.sum(axis=0), 1, rtol=1e-5)
+
+
+def photo_of(seed):
+    rng = np.random.default_rng(seed)
+    _, pixels, labels = render_facade(builtin("haussmann"), 200, 280, rng=rng)
+    return Photo("a.png", pixels, "0" * 64), labels
+
+
+def test_without_a_solution_of_its_own_the_second_says_nothing():
+    def none(photo, identity, *, rng, mask=None):
+        raise Infeasible("nothing")
+
+    photo, _ = photo_of(0)
+    alone = forest_method(ReadOptions())(photo, "a", rng=np.random.default_rng(0))
+    beside = forest_method(ReadOptions(), second=none)(photo, "a", rng=np.random.default_rng(0))
+    assert beside.parse.regions == alone.parse.regions
+    assert (alone.parse.method, beside.parse.method) == ("forest", "both")
+
+
+def test_the_classifiers_own_labels_stay_its_own():
+    photo, _ = photo_of(1)
+    alone, beside = (
+        forest_method(ReadOptions(), second=second)(photo, "a", rng=np.random.default_rng(0))
+        for second in (None, mrf_method(ReadOptions()))
+    )
+    np.testing.assert_array_equal(alone.raw, beside.raw)
+
+
+@pytest.fixture(scope="module")
+def picture(tmp_path_factory):
+    from test_pictures import png
+
+    path = tmp_path_factory.mktemp("photo") / "a.png"
+    path.write_bytes(png(photo_of(2)[0].pixels))
+    return path
+
+
+def test_the_default_depends_on_the_classifier(facade_here, picture, tmp_path):
+    npz = tmp_path / "own.npz"
+    npz.write_bytes(save(default()))
+    methods = {
+        "both": (),
+        "forest": ("--classifier", npz),
+        "mrf": ("--method", "mrf"),
+    }
+    for method, words in methods.items():
+        done = facade_here("parse-image", picture, *words)
+        assert done.returncode == 0, done.stderr
+        parse = json.loads(done.stdout)
+        assert parse["method"] == parse["provenance"]["options"]["method"] == method
+
+
+def test_both_take_metres(facade_here, picture):
+    done = facade_here("parse-image", picture, "--height", 18)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["tags"]["scale"] == "height"
+    assert facade_here("parse-image", picture, "--method", "forest", "--height", 18).returncode == 2

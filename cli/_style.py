@@ -11,6 +11,7 @@ from math import inf
 from pathlib import Path
 
 import click
+import numpy as np
 
 from facade_tools.artifacts.blocks import Blocks
 from facade_tools.artifacts.building import Building
@@ -19,9 +20,10 @@ from facade_tools.artifacts.provenance import Provenance
 from facade_tools.artifacts.store import RawItem, digest, read_raw
 from facade_tools.artifacts.writing import atomic_folder
 from facade_tools.errors import InvalidInput
-from facade_tools.formats.exporting import model_files
+from facade_tools.formats.exporting import FAR, model_files, near_origin
 from facade_tools.formats.mesh_reader import ENDINGS, read_textured
 from facade_tools.formats.style_folder import read_style, write_style
+from facade_tools.geometry.arrays import Floats
 from facade_tools.geometry.mesh import Scene
 from facade_tools.randomness import item_generator
 from facade_tools.stylization.bases import (
@@ -89,16 +91,22 @@ class Dresser:
     small: float
     seed: int
 
-    def __call__(self, source: Source) -> tuple[str, Scene]:
-        """Return the base's id and its scene; raises InvalidInput with its place."""
+    def __call__(self, source: Source) -> tuple[str, Scene, Floats]:
+        """Return the base's id, its scene and how far that is from its place (3,), m.
+
+        Raises InvalidInput with the place of what is wrong.
+        """
         try:
             return self.dressed(*_base(source))
         except InvalidInput as error:
             raise error.at(*_place(source)) from None
 
-    def dressed(self, base: Blocks, plain: bool, building: Building | None) -> tuple[str, Scene]:
-        """Return id and scene; plain: whether the base may be given a bottom and a top."""
+    def dressed(
+        self, base: Blocks, plain: bool, building: Building | None
+    ) -> tuple[str, Scene, Floats]:
+        """Return id, scene and the shift; plain: may the base be given a bottom and a top."""
         check_blocks(base)
+        base, building, step = _brought_near(base, building)
         blocks = resized(base, self.sizes) if self.sizes else base
         rng = item_generator(self.seed, "retarget", base.id)
         chosen = self.styles[
@@ -110,7 +118,27 @@ class Dresser:
         scene = retarget(chosen, blocks, self.small, flush=roofed)
         if building is not None and roofed:
             scene = crowned(scene, chosen, building)
-        return base.id, scene
+        return base.id, scene, step
+
+
+def _brought_near(
+    base: Blocks, building: Building | None
+) -> tuple[Blocks, Building | None, Floats]:
+    """Return a base whose frame has no far shift, and that shift (3,), m.
+
+    What is computed and compared in single precision would be a ruin at a map's coordinates.
+    """
+    step: Floats = np.zeros(3)
+    if base.frame is None:
+        return base, building, step
+    frame = np.array(base.frame, dtype=np.float64)
+    if np.abs(frame[:3, 3]).max() <= FAR:
+        return base, building, step
+    step, frame[:3, 3] = frame[:3, 3].copy(), 0.0
+    base = replace(base, frame=tuple(tuple(row) for row in frame.tolist()))
+    if building is not None and building.frame is not None:
+        building = replace(building, frame=replace(building.frame, shift=(0.0, 0.0, 0.0)))
+    return base, building, step
 
 
 def run_retarget(
@@ -126,7 +154,9 @@ def run_retarget(
     sheets = [_style(Path(folder)) for folder in styles]
     dresser = Dresser(sheets, sizes, small, stream.seed or 0)
     seen: set[str] = set()
-    for identity, scene in each("retarget", dresser, stream, sources):
+    origin: Floats = np.zeros(3)
+    for identity, scene, step in each("retarget", dresser, stream, sources):
+        scene, origin = near_origin(scene, step, origin)
         name = new_file_name(identity, seen)
         folder, stem = (
             (Path(output), name) if is_folder(output) else (Path(output).parent, Path(output).stem)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import click
 
-from ._options import FiniteRange, StreamOptions, on_error, output, seed
+from ._options import FiniteRange, StreamOptions, jobs, on_error, output, scheduler, seed
 
 
 @click.command()
@@ -33,6 +35,8 @@ from ._options import FiniteRange, StreamOptions, on_error, output, seed
     "otherwise than in the source, takes the texture of a larger group; 0 never.",
 )
 @seed
+@jobs
+@scheduler
 @on_error
 def command(
     style: str,
@@ -41,8 +45,7 @@ def command(
     styles: tuple[str, ...],
     resize: tuple[str, ...],
     reassign: float,
-    seed: int,
-    on_error: str,
+    **values: Any,
 ) -> None:
     """Put the look of a style sheet onto buildings of another structure (LNSW13).
 
@@ -62,5 +65,5 @@ def command(
     rest = [base for base in bases if base not in more]
     if not rest:
         raise click.UsageError("Missing argument 'BASE...'.")
-    stream = StreamOptions(tuple(rest), output, seed, 1, None, on_error)
+    stream = StreamOptions(inputs=tuple(rest), output=output, **values)
     run_retarget((style, *styles, *more), stream, resize, reassign)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
+import trimesh
 
 from facade_tools.formats.mesh_reader import read_textured
 from facade_tools.formats.style_folder import write_style
@@ -95,3 +97,58 @@ def test_bad_bases_are_skipped_if_asked(facade_here, sheet, tmp_path):
     assert done.returncode == 3
     assert "1 bad items were skipped" in done.stderr.decode()
     assert [path.name for path in out.iterdir()] == ["good.glb"]
+
+
+TURN = [[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]]
+
+
+def frame(x, y, z):
+    return [[*row, step] for row, step in zip(TURN, (x, y, z), strict=True)] + [[0, 0, 0, 1]]
+
+
+def scene_of(path):
+    return trimesh.load_scene(path, process=False)
+
+
+def test_bases_on_a_map_keep_their_shape_and_their_distance(facade_here, sheet, tmp_path):
+    """In single precision, walls at such places would stand half a metre off the solid."""
+    places = {"a": (0, 0, 0), "b": (4468000.25, 5333000.5, 520), "c": (4468100.25, 5333000.5, 520)}
+    bases = [base_file(tmp_path / f"{n}.json", n, frame=frame(*p)) for n, p in places.items()]
+    done = facade_here("retarget", sheet, *bases, "-o", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.count(b"too far from 0") == 1
+    assert b"b: too far from 0 for 32-bit floats; the origin of this and what follows is 44" in (
+        done.stderr
+    )
+    near, far, beside = (scene_of(tmp_path / "out" / f"{name}.glb") for name in places)
+    steps = [far.bounds[0] - near.bounds[0], beside.bounds[0] - far.bounds[0]]
+    assert np.allclose(steps[1], [100, 0, 0], atol=1e-3)
+    for name, mesh in near.geometry.items():
+        moved = far.geometry[name].vertices - steps[0]
+        assert np.allclose(moved, mesh.vertices, atol=1e-4), name
+
+
+def test_a_house_on_a_map_has_its_roof_on_its_walls(facade_here, sheet, tmp_path):
+    roof = {"style": "gable", "pitch": 40, "direction": "x"}
+    box = {"id": "m", "kind": "general", "x": 6, "y": 4, "width": 12, "depth": 8, "height": 6}
+    house = {"schema": "facade-tools/building/1", "id": "h", "boxes": [{**box, "roof": roof}]}
+    volumes = []
+    for shift in ([0, 0, 0], [468000.25, 5333000.5, 520]):
+        place = {"shift": shift, "rotation": 30, "crs": "EPSG:25832"}
+        (tmp_path / "h.json").write_text(json.dumps({**house, "facades": {}, "frame": place}))
+        done = facade_here("retarget", sheet, tmp_path / "h.json", "-o", tmp_path / "h.glb")
+        assert done.returncode == 0, done.stderr
+        mass = scene_of(tmp_path / "h.glb").geometry["mass"]
+        assert mass.is_watertight
+        volumes.append(mass.volume)
+    assert volumes[1] == pytest.approx(volumes[0], rel=1e-5)
+    assert volumes[0] > 12 * 8 * 6
+
+
+def test_jobs_change_no_byte(facade_here, sheet, tmp_path):
+    bases = [base_file(tmp_path / f"{k}.json", f"b{k}") for k in range(3)]
+    for jobs in (1, 2):
+        out = tmp_path / str(jobs)
+        assert facade_here("retarget", sheet, *bases, "-o", out, "--jobs", jobs).returncode == 0
+    for path in (tmp_path / "1").iterdir():
+        assert path.read_bytes() == (tmp_path / "2" / path.name).read_bytes()

@@ -66,7 +66,7 @@ def _near(parts: list[Part]) -> list[Part]:
     boxes = np.array([_bounds(part) for part in parts if isinstance(part, Scene)])
     if np.abs(boxes).max(initial=0.0) <= FAR:
         return parts
-    origin = np.floor(boxes[0, 0]) * (np.abs(boxes[0, 0]) > FAR)  # heights mostly stay
+    origin = _origin(boxes[0, 0])
     if np.abs(boxes - origin).max() > FAR:
         log.warning("models over 10 km apart: 32-bit floats round them; try side-by-side")
     if origin.any():
@@ -74,6 +74,30 @@ def _near(parts: list[Part]) -> list[Part]:
         name = parts[0].name
         log.warning("%s: too far from 0 for 32-bit floats; the model's origin is %s", name, place)
     return [_moved(part, np.eye(3), -origin) for part in parts]
+
+
+def _origin(low: Floats) -> Floats:
+    """Return the whole metres that bring a low corner to 0; heights mostly stay."""
+    origin: Floats = np.floor(low) * (np.abs(low) > FAR)
+    return origin
+
+
+def near_origin(scene: Scene, step: Floats, origin: Floats) -> tuple[Scene, Floats]:
+    """Return a scene shifted by `step` (m) as seen from an origin, and that origin.
+
+    origin: of the scenes before it, that files of one folder fit together. Where the scene stands
+    over 10 km from it, it is a new one, with a warning.
+    """
+    box = bounds(scene) + step
+    if np.abs(box - origin).max() > FAR and (_origin(box[0]) != origin).any():
+        origin = _origin(box[0])
+        place = ", ".join(f"{value:.0f}" for value in origin)
+        log.warning(
+            "%s: too far from 0 for 32-bit floats; the origin of this and what follows is %s",
+            scene.name,
+            place,
+        )
+    return (moved(scene, np.eye(3), step - origin) if (step != origin).any() else scene), origin
 
 
 def _is_map(frames: Sequence[Frame]) -> bool:

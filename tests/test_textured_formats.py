@@ -83,8 +83,8 @@ def test_colours_of_vertices_paint_a_ply(tmp_path):
     lines += ["0 0 0 200 100 0", "1 0 0 200 100 0", "0 0 1 200 100 30", "3 0 1 2"]
     (tmp_path / "x.ply").write_text("\n".join(lines))
     mesh = read_textured(tmp_path / "x.ply")
-    assert mesh.paints[0].color == (200, 100, 10)
-    assert np.isnan(mesh.uv).all()
+    assert mesh.paints[mesh.paint[0]].color == (200, 100, 10)
+    assert mesh.paints[mesh.paint[0]].picture.shape == (2, 2, 3)
 
 
 @settings(max_examples=60, deadline=None)

@@ -14,7 +14,6 @@ from .textured import Paint, TexturedMesh
 
 MESH_ENDINGS = ENDINGS
 WHITE = "#ffffff"
-LINEAR = (".glb", ".gltf")
 
 log = logging.getLogger("facade_tools.formats")
 
@@ -28,9 +27,8 @@ def read_scene(path: Path) -> Scene:
     for note in mesh.notes:
         log.info("%s: %s", path.name, note)
     names = [f"material-{index}" for index in range(len(mesh.paints))]
-    linear = path.suffix.lower() in LINEAR
     materials = {
-        name: _material(name, paint, linear) for name, paint in zip(names, mesh.paints, strict=True)
+        name: _material(name, paint) for name, paint in zip(names, mesh.paints, strict=True)
     }
     used = np.unique(mesh.paint).tolist()
     meshes = tuple(_part(names[index], mesh, mesh.paint == index) for index in used)
@@ -45,16 +43,7 @@ def _part(name: str, mesh: TexturedMesh, rows: np.ndarray[tuple[int], np.dtype[n
     return Mesh(name, corners, faces, name, uv if textured else None)
 
 
-def _material(name: str, paint: Paint, linear: bool) -> Material:
-    """Return a paint as a material; linear: its colour is linear light and tints its picture."""
-    color = bytes(_srgb(value) for value in paint.color) if linear else bytes(paint.color)
+def _material(name: str, paint: Paint) -> Material:
     if paint.picture is None:
-        return Material(name, f"#{color.hex()}")
-    tint = f"#{color.hex()}" if linear else WHITE
-    return Material(name, tint, texture=png.write(paint.picture, effort=1))
-
-
-def _srgb(value: int) -> int:
-    share = value / 255
-    curved = 12.92 * share if share <= 0.0031308 else 1.055 * share ** (1 / 2.4) - 0.055
-    return round(255 * curved)
+        return Material(name, f"#{bytes(paint.color).hex()}")
+    return Material(name, WHITE, texture=png.write(paint.picture, effort=1))

@@ -97,7 +97,7 @@ def _read_paint(name: str, effect: Any, textures: Textures) -> Paint:
     diffuse = getattr(effect, "diffuse", None)
     image = getattr(getattr(getattr(diffuse, "sampler", None), "surface", None), "image", None)
     if image is not None and image.path:
-        return Paint(name, GREY, textures.read(_file(image.path)))
+        return textures.paint(name, GREY, _file(image.path))
     if not isinstance(diffuse, (tuple, list)):
         textures.notes.append(f"material {name!r} has no texture: drawn in its plain colour")
         return Paint(name)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import InvalidInput, Place
-from .textured import GREY, Paint, TexturedMesh, Textures, read_bytes
+from .textured import GREY, Colours, Paint, TexturedMesh, Textures, read_bytes, with_colours
 from .textured_polygons import MAX_CORNERS, polygonal_mesh
 
 
@@ -37,17 +37,22 @@ def read_obj(path: Path) -> TexturedMesh:
         raise InvalidInput("holds no faces; expected a mesh").at(str(path))
     textures = Textures(path.parent)
     table = _materials(path.parent, content.libraries, textures)
-    paints = tuple(table.get(name, Paint(name or "none")) for name in content.names)
+    maps = [table.get(name, _Map(name)) for name in content.names]
+    paints = tuple(textures.paint(one.name or "none", one.color, one.file) for one in maps)
     mesh = _triangulated(content, paints)
+    uv = mesh.uv * np.array([one.scale for one in maps])[mesh.paint, None]
+    uv += np.array([one.offset for one in maps])[mesh.paint, None]
     notes = (*mesh.notes, *dict.fromkeys(textures.notes))
-    return TexturedMesh(mesh.vertices, mesh.faces, mesh.uv, mesh.paint, paints, notes)
+    mesh = replace(mesh, uv=uv, notes=notes)
+    colours = _colours(content.positions)
+    return mesh if colours is None else with_colours(mesh, colours[mesh.faces])
 
 
 def _parsed(text: str, name: str) -> _Content:
     content = _Content()
     paint = 0
     for number, line in enumerate(text.replace("\\\n", " ").split("\n"), 1):
-        word, _, rest = line.strip().partition(" ")
+        word, rest = _statement(line)
         try:
             if word == "v":
                 content.positions.append(_position(rest))
@@ -67,11 +72,28 @@ def _parsed(text: str, name: str) -> _Content:
     return content
 
 
+def _statement(line: str) -> tuple[str, str]:
+    """Return the keyword of a line and what follows; either is parted by spaces or tabs."""
+    words = line.split(None, 1)
+    return (words[0] if words else ""), (words[1] if len(words) > 1 else "").strip()
+
+
 def _position(rest: str) -> tuple[float, ...]:
-    position = tuple(map(float, rest.split()[:3]))
-    if len(position) != 3 or not all(map(math.isfinite, position)):
+    """Return x, y, z, and whatever else stands there: a weight, or red, green and blue."""
+    position = tuple(map(float, rest.split()[:7]))
+    if len(position) < 3 or not all(map(math.isfinite, position)):
         raise InvalidInput("vertices need three finite coordinates")
     return position
+
+
+def _colours(positions: list[tuple[float, ...]]) -> Colours | None:
+    """Return the colours (n, 3) that stand behind the coordinates of all vertices, if they do."""
+    if min(map(len, positions)) < 6:
+        return None
+    shares = np.array([position[3:6] for position in positions])
+    shares = shares if shares.max() > 1 else 255 * shares
+    colours: Colours = np.round(np.clip(shares, 0, 255)).astype(np.uint8)
+    return colours
 
 
 def _add_face(content: _Content, rest: str, paint: int) -> None:
@@ -108,33 +130,49 @@ def _triangulated(content: _Content, paints: tuple[Paint, ...]) -> TexturedMesh:
     texture = np.vstack([texture, [math.nan, math.nan]])  # index -1
     rings = [np.array([vertex for vertex, _ in corners]) for corners in content.polygons]
     uv = [texture[[slot for _, slot in corners]] for corners in content.polygons]
-    vertices = np.array(content.positions, dtype=np.float64)
+    vertices = np.array([position[:3] for position in content.positions], dtype=np.float64)
     return polygonal_mesh(vertices, rings, uv, content.paint, paints)
 
 
-def _materials(folder: Path, libraries: list[str], textures: Textures) -> dict[str, Paint]:
-    table: dict[str, Paint] = {}
-    for library in libraries:
-        path = (folder / library.replace("\\", "/")).resolve()
+@dataclass(frozen=True, slots=True)
+class _Map:
+    """A material: its colour, and a texture's file with the scale and offset of its uv."""
+
+    name: str
+    color: tuple[int, int, int] = GREY
+    file: str = ""
+    scale: tuple[float, float] = (1.0, 1.0)
+    offset: tuple[float, float] = (0.0, 0.0)
+
+
+def _materials(folder: Path, libraries: list[str], textures: Textures) -> dict[str, _Map]:
+    table: dict[str, _Map] = {}
+    for library in (name for names in libraries for name in _names(folder, names)):
+        path = (folder / library).resolve()
         if not path.is_relative_to(folder.resolve()) or not path.is_file():
             textures.notes.append(f"material library {library!r} is missing or outside the folder")
             continue
         text = read_bytes(path).decode("utf-8", errors="replace")
-        for name, color, picture in _paint_rows(text):
-            table[name] = Paint(name, color, textures.read(picture) if picture else None)
+        table |= {row.name: row for row in _rows(text)}
     return table
 
 
-def _paint_rows(text: str) -> list[tuple[str, tuple[int, int, int], str]]:
-    rows: list[tuple[str, tuple[int, int, int], str]] = []
+def _names(folder: Path, names: str) -> list[str]:
+    """Return the libraries that a statement names: one with spaces in its name, or several."""
+    names = names.replace("\\", "/").strip('"')
+    return [names] if (folder / names).is_file() else names.split() or [names]
+
+
+def _rows(text: str) -> list[_Map]:
+    rows: list[_Map] = []
     for line in text.splitlines():
-        word, _, rest = line.strip().partition(" ")
+        word, rest = _statement(line)
         if word == "newmtl":
-            rows.append((rest.strip(), GREY, ""))
+            rows.append(_Map(rest))
         elif rows and word == "Kd":
-            rows[-1] = (rows[-1][0], _color(rest), rows[-1][2])
-        elif rows and word == "map_Kd":
-            rows[-1] = (*rows[-1][:2], _map_name(rest))
+            rows[-1] = replace(rows[-1], color=_color(rest))
+        elif rows and word.casefold() == "map_kd":
+            rows[-1] = _mapped(rows[-1], rest)
     return rows
 
 
@@ -146,12 +184,33 @@ def _color(rest: str) -> tuple[int, int, int]:
     return round(255 * r), round(255 * g), round(255 * b)
 
 
-OPTIONS = {"-o": 3, "-s": 3, "-t": 3, "-mm": 2, "-bm": 1, "-clamp": 1, "-blendu": 1, "-blendv": 1}
+VECTORS = {"-s": 1.0, "-o": 0.0, "-t": 0.0}  # of one to three numbers; and what the rest are
+ARGUMENTS = {
+    **{"-mm": 2, "-bm": 1, "-clamp": 1, "-blendu": 1, "-blendv": 1},
+    **{"-cc": 1, "-texres": 1, "-imfchan": 1, "-boost": 1, "-type": 1},
+}
 
 
-def _map_name(rest: str) -> str:
-    """Return the file name of a map statement without its options; names may hold spaces."""
-    words = rest.strip().split(" ")
-    while words and words[0] in OPTIONS:
-        words = words[1 + OPTIONS[words[0]] :]
-    return " ".join(words)
+def _mapped(row: _Map, rest: str) -> _Map:
+    """Return a material with the texture that a map statement names; names may hold spaces."""
+    words = rest.split(" ")
+    vectors: dict[str, tuple[float, float]] = {}
+    while words and words[0] in {"", *VECTORS, *ARGUMENTS}:
+        option = words.pop(0)
+        if option in VECTORS:
+            found: list[float] = []
+            while len(found) < 3 and len(words) > 1 and _is_number(words[0]):
+                found.append(float(words.pop(0)))
+            u, v = (*found, VECTORS[option], VECTORS[option])[:2]
+            vectors[option] = u, v
+        else:
+            del words[: ARGUMENTS.get(option, 0)]
+    scale, offset = vectors.get("-s", row.scale), vectors.get("-o", row.offset)
+    return replace(row, file=" ".join(words).strip().strip('"'), scale=scale, offset=offset)
+
+
+def _is_number(word: str) -> bool:
+    try:
+        return math.isfinite(float(word))
+    except ValueError:
+        return False

@@ -1,4 +1,4 @@
-"""PLY as scanners and modellers write it: polygons of any size, three encodings, one texture."""
+"""PLY as scanners and modellers write it: polygons of any size, three encodings, any textures."""
 
 from __future__ import annotations
 
@@ -11,7 +11,15 @@ from numpy.typing import NDArray
 
 from ..errors import InvalidInput
 from ..geometry.arrays import Floats, Integers
-from .textured import Paint, TexturedMesh, Textures, read_bytes
+from .textured import (
+    GREY,
+    Colours,
+    Paint,
+    TexturedMesh,
+    Textures,
+    read_bytes,
+    with_colours,
+)
 from .textured_polygons import MAX_CORNERS, polygonal_mesh
 
 TYPES = {
@@ -36,14 +44,15 @@ class _Element:
 
 
 def read_ply(path: Path) -> TexturedMesh:
-    """Return the mesh of a PLY file with the picture that its comments name.
+    """Return the mesh of a PLY file with the pictures that its comments name.
 
-    Coordinates of textures stand at the vertices or at the corners of faces. Colours of vertices
-    become their mean. Raises InvalidInput on what cannot be read.
+    Coordinates of textures stand at the vertices or at the corners of faces, the number of the
+    texture at the faces. Faces without a picture have their colours or those of their vertices.
+    Raises InvalidInput on what cannot be read.
     """
     data = read_bytes(path)
     try:
-        order, elements, picture, start = _header(data)
+        order, elements, pictures, start = _header(data)
         content = dict(_content(data, start, order, elements))
         vertex, face = content["vertex"], content["face"]
         vertices = np.column_stack([np.asarray(vertex[axis]) for axis in "xyz"])
@@ -56,18 +65,27 @@ def read_ply(path: Path) -> TexturedMesh:
     if not rings:
         raise InvalidInput("holds no faces; expected a mesh").at(str(path))
     textures = Textures(path.parent)
-    paint = _paint(vertex, textures.read(picture) if picture else None)
-    mesh = polygonal_mesh(vertices, rings, _uv(vertex, face, rings), [0] * len(rings), (paint,))
-    notes = () if picture else ("the file names no texture: drawn in its plain colour",)
-    return replace(mesh, notes=(*mesh.notes, *textures.notes, *notes))
+    mesh = polygonal_mesh(vertices, rings, _uv(vertex, face, rings), range(len(rings)), ())
+    paints = [textures.paint(f"texture-{i}", GREY, name) for i, name in enumerate(pictures)]
+    number = _numbers(face, len(rings))[mesh.paint]  # the paint of a triangle is its ring's number
+    known = (number >= 0) & (number < len(paints))
+    colours = _colours(vertex, face, mesh)
+    mesh = replace(
+        mesh,
+        paint=np.where(known, number, len(paints)),
+        paints=(*paints, Paint("none")),
+        notes=(*mesh.notes, *textures.notes),
+    )
+    return mesh if colours is None else with_colours(mesh, colours)
 
 
-def _header(data: bytes) -> tuple[str, list[_Element], str, int]:
-    """Return byte order ("" for text), the elements, the texture's name, and where data begins."""
+def _header(data: bytes) -> tuple[str, list[_Element], list[str], int]:
+    """Return byte order ("" for text), the elements, the textures, and where data begins."""
     end = data.find(b"end_header")
     if not data.startswith(b"ply") or end < 0:
         raise ValueError("no header")
-    order, picture = "", ""
+    order = ""
+    pictures: list[str] = []
     elements: list[_Element] = []
     for line in data[:end].decode("utf-8", errors="replace").splitlines():
         words = line.split()
@@ -80,8 +98,8 @@ def _header(data: bytes) -> tuple[str, list[_Element], str, int]:
         elif words[:1] == ["property"]:
             elements[-1].properties.append((words[2], TYPES[words[1]], ""))
         elif words[:1] == ["comment"] and words[1:2] and words[1].lower() == "texturefile":
-            picture = line.split(None, 2)[2].strip()
-    return order, elements, picture, data.index(b"\n", end) + 1
+            pictures.append(line.split(None, 2)[2].strip())
+    return order, elements, pictures, data.index(b"\n", end) + 1
 
 
 def _content(
@@ -167,9 +185,30 @@ def _uv(
     return [places[np.clip(ring, 0, len(places) - 1)] for ring in rings]
 
 
-def _paint(vertex: dict[str, Column], picture: NDArray[np.uint8] | None) -> Paint:
-    plain = Paint("texture" if picture is not None else "none", picture=picture)
-    if not set(COLOURS) <= set(vertex) or not len(vertex["red"]):
-        return plain
-    r, g, b = (round(float(np.clip(np.mean(np.asarray(vertex[c])), 0, 255))) for c in COLOURS)
-    return Paint(plain.name, (r, g, b), picture)
+def _numbers(face: dict[str, Column], count: int) -> Integers:
+    """Return the number of every face's texture."""
+    if "texnumber" not in face:
+        return np.zeros(count, dtype=np.int64)
+    return np.clip(_scalars(face["texnumber"]), -1, MAX_CORNERS).astype(np.int64)
+
+
+def _scalars(column: Column) -> Floats:
+    """Return a property that has one number, whichever way it was read; 0 for what is none."""
+    values = [float(np.ravel(value)[0]) if np.size(value) else 0.0 for value in column]
+    return np.nan_to_num(np.array(values, dtype=np.float64))
+
+
+def _colours(
+    vertex: dict[str, Column], face: dict[str, Column], mesh: TexturedMesh
+) -> Colours | None:
+    """Return the colours (m, 3, 3) of triangles' corners, those of their faces or vertices."""
+    if set(COLOURS) <= set(face):
+        return np.repeat(_rgb(face)[mesh.paint][:, None], 3, axis=1)
+    return _rgb(vertex)[mesh.faces] if set(COLOURS) <= set(vertex) else None
+
+
+def _rgb(element: dict[str, Column]) -> Colours:
+    """Return colours (n, 3) of bytes, or of shares where they are numbers up to 1 with a point."""
+    values = np.stack([_scalars(element[name]) for name in COLOURS], axis=1)
+    shares = values.max(initial=0.0) <= 1.0 and (values % 1.0).any()
+    return np.round(np.clip(255 * values if shares else values, 0, 255)).astype(np.uint8)

@@ -23,10 +23,12 @@ from .image_headers import Header, header
 from .sgi import decoded_sgi
 
 Picture = NDArray[np.uint8]  # (height, width, 3) RGB
+Holes = NDArray[np.bool_]  # (height, width), where one sees through a picture
 
 MAX_BYTES = 256 << 20
-MAX_PIXELS = 64_000_000
+MAX_PIXELS = 1 << 26  # 8192 × 8192, the usual largest texture
 MAX_SIDE = 30_000
+TRANSPARENT = ("PNG", "TIFF", "WebP")
 PICTURES = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".bmp", ".webp")
 
 
@@ -49,9 +51,33 @@ def read_photo(path: str) -> Photo:
 
 def decoded(data: bytes, name: str) -> Picture:
     """Return the RGB picture of an encoded file. Raises InvalidInput with `name`."""
+    return _eight_bit_rgb(_decoded(data, name, alpha=False))
+
+
+def decoded_texture(data: bytes, name: str) -> tuple[Picture, Holes | None]:
+    """Return the RGB picture of an encoded file, and where one sees through it.
+
+    The holes (h, w) are the pixels that are more than half transparent; None where there are none,
+    or where nothing else would be left. Raises InvalidInput with `name`.
+    """
+    picture = _decoded(data, name, alpha=True)
+    rgb = _eight_bit_rgb(picture)
+    if picture.ndim == 2 or picture.shape[2] < 4:
+        return rgb, None
+    holes: Holes = picture[:, :, 3].astype(np.float64) < 0.5 * _most(picture)
+    return rgb, (holes if holes.any() and not holes.all() else None)
+
+
+def _most(picture: NDArray[np.generic]) -> float:
+    kind = picture.dtype
+    return float(np.iinfo(kind).max) if kind.kind == "u" else 1.0  # type: ignore[type-var]
+
+
+def _decoded(data: bytes, name: str, *, alpha: bool) -> NDArray[np.generic]:
+    """Return a picture as it is stored; alpha: with its transparency, where it has one."""
     info = header(data, name)
     if max(info.width, info.height) > MAX_SIDE or info.width * info.height > MAX_PIXELS:
-        limit = f"{MAX_PIXELS // 10**6} megapixels"
+        limit = f"{MAX_PIXELS >> 20} megapixels"
         raise InvalidInput(f"has {info.width}×{info.height} pixels; expected at most {limit}").at(
             name
         )
@@ -65,11 +91,12 @@ def decoded(data: bytes, name: str) -> Picture:
         picture = found if found is None or found.ndim == 2 else found[:, :, ::-1]
     else:
         with _quiet():
-            flags = cv2.IMREAD_UNCHANGED if info.deep else cv2.IMREAD_COLOR
+            whole = info.deep or (alpha and info.format in TRANSPARENT)
+            flags = cv2.IMREAD_UNCHANGED if whole else cv2.IMREAD_COLOR
             picture = _decode(data, flags)
     if picture is None:
         raise InvalidInput(f"cannot be decoded as {info.format}").at(name)
-    return _eight_bit_rgb(picture)
+    return picture
 
 
 def _truncated(info: Header) -> InvalidInput:

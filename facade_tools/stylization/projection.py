@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,11 +36,19 @@ SIDES = {
 class Palette:
     """All pictures of a model as one array of bytes, so that compiled code can read them.
 
-    pixels: flat bytes; table (p, 3): offset, height, width. A plain colour is a 1×1 picture.
+    pixels: flat bytes; table (p, 4): offset, height, width, and offset in `holes`, -1 where there
+    are none. A plain colour is a 1×1 picture. holes: flat, where one sees through the pictures.
     """
 
     pixels: Picture
     table: Integers
+    holes: Booleans
+
+    def closed(self) -> Palette:
+        """Return the palette with all pictures opaque."""
+        table = self.table.copy()
+        table[:, 3] = -1
+        return replace(self, table=table)
 
 
 def palette(mesh: TexturedMesh) -> Palette:
@@ -50,8 +58,17 @@ def palette(mesh: TexturedMesh) -> Palette:
         for paint in mesh.paints
     ]
     offsets = np.cumsum([0, *(picture.size for picture in pictures)])[:-1]
-    rows = [(o, p.shape[0], p.shape[1]) for o, p in zip(offsets, pictures, strict=True)]
-    return Palette(np.concatenate([p.ravel() for p in pictures]), np.array(rows, dtype=np.int64))
+    holes = [paint.holes for paint in mesh.paints]
+    sizes = [0 if one is None else one.size for one in holes]
+    starts = np.where(np.array(sizes) > 0, np.cumsum([0, *sizes])[:-1], -1)
+    rows = [
+        (o, p.shape[0], p.shape[1], h) for o, p, h in zip(offsets, pictures, starts, strict=True)
+    ]
+    return Palette(
+        np.concatenate([p.ravel() for p in pictures]),
+        np.array(rows, dtype=np.int64),
+        np.concatenate([np.zeros(0, dtype=bool), *(h.ravel() for h in holes if h is not None)]),
+    )
 
 
 def texel_density(mesh: TexturedMesh) -> float:
@@ -67,6 +84,8 @@ def texel_density(mesh: TexturedMesh) -> float:
     if not known.any():
         return DEFAULT_DENSITY
     density = np.sqrt(texels[known] / area[known])
+    plain = np.array([p.gradient for p in mesh.paints])[mesh.paint[known]]
+    density = np.where(plain, np.maximum(density, DEFAULT_DENSITY), density)
     order = np.argsort(density)
     weight = np.cumsum(area[known][order])
     return float(density[order][np.searchsorted(weight, 0.5 * weight[-1])])
@@ -180,7 +199,7 @@ def top_picture(mesh: TexturedMesh, low: Floats, high: Floats, density: float) -
     scale = np.array([shape[1] / width, shape[0] / depth])
     reach = float(np.ptp(mesh.vertices[:, 2])) + 1.0
     surface = Surface(view, uv, mesh.paint[flat], palette(mesh))
-    picture, covered = _rendered(surface, scale, shape, reach, reach)
+    picture, covered = _opaque(surface, scale, shape, reach, reach)
     return _filled(picture, covered) if covered.any() else np.full((*shape, 3), 190, np.uint8)
 
 
@@ -245,10 +264,25 @@ def _drawn(
 
     hidden: pixels at which the nearest surface is drawn instead of the outermost.
     """
-    picture, covered = _rendered(surface, scale, shape, reach, reach)
+    picture, covered = _opaque(surface, scale, shape, reach, reach)
     if hidden.any():
-        nearest, near = _rendered(surface, scale, shape, 0.0, reach)
+        nearest, near = _opaque(surface, scale, shape, 0.0, reach)
         picture[hidden], covered[hidden] = nearest[hidden], near[hidden]
+    return picture, covered
+
+
+def _opaque(
+    surface: Surface, scale: Floats, shape: tuple[int, int], focus: float, reach: float
+) -> tuple[Picture, Booleans]:
+    """Return as `_rendered` does what one does not see through, and where anything is.
+
+    Where nothing else is, holes of pictures are drawn: many alpha channels mean nothing.
+    """
+    picture, covered = _rendered(surface, scale, shape, focus, reach)
+    if len(surface.paints.holes) and not covered.all():
+        closed = replace(surface, paints=surface.paints.closed())
+        under, seen = _rendered(closed, scale, shape, focus, reach)
+        picture[~covered], covered = under[~covered], covered | seen
     return picture, covered
 
 
@@ -266,7 +300,7 @@ def _rendered(
     pixels = surface.view * np.array([*scale, 1.0]) - np.array([0.0, 0.0, focus])
     picture = np.zeros((*shape, 3), dtype=np.uint8)
     depth = np.full(shape, focus + reach)
-    colours = surface.paints.pixels, surface.paints.table
+    colours = surface.paints.pixels, surface.paints.table, surface.paints.holes
     _rasterise(pixels, surface.uv, surface.paint, *colours, picture, depth)
     return picture, depth < focus + reach
 
@@ -278,6 +312,7 @@ def _rasterise(
     paint: Integers,
     pixels: Picture,
     table: Integers,
+    holes: Booleans,
     picture: Picture,
     depth: Floats,
 ) -> None:
@@ -299,6 +334,7 @@ def _rasterise(
         left = max(0, math.floor(min(x0, x1, x2)))
         right = min(columns, math.ceil(max(x0, x1, x2)) + 1)
         offset, h, w = table[paint[t], 0], table[paint[t], 1], table[paint[t], 2]
+        hole = table[paint[t], 3]
         for row in range(top, bottom):
             for column in range(left, right):
                 x, y = column + 0.5, row + 0.5
@@ -310,11 +346,15 @@ def _rasterise(
                 distance = abs(b0 * d0 + b1 * d1 + b2 * d2)
                 if distance >= depth[row, column]:
                     continue
-                depth[row, column] = distance
                 u = b0 * uv[t, 0, 0] + b1 * uv[t, 1, 0] + b2 * uv[t, 2, 0]
                 v = b0 * uv[t, 0, 1] + b1 * uv[t, 1, 1] + b2 * uv[t, 2, 1]
                 fx = (u - math.floor(u)) * w - 0.5
                 fy = (1.0 - (v - math.floor(v))) * h - 0.5
+                if hole >= 0:
+                    nearest = math.floor(fy + 0.5) % h * w + math.floor(fx + 0.5) % w
+                    if holes[hole + nearest]:
+                        continue
+                depth[row, column] = distance
                 c0, r0 = math.floor(fx), math.floor(fy)
                 ax, ay = fx - c0, fy - r0
                 for channel in range(3):

@@ -24,6 +24,7 @@ RULES = {
     "building": "facade_tools.geometry.checks:building_problems",
     "derivation": "facade_tools.reconstruction.records:derivation_problems",
     "layout": "facade_tools.layering.assets:layout_problems",
+    "stylesheet": "facade_tools.formats.style_folder:sheet_problems",
     "shape-grammar": "facade_tools.reconstruction.rules:grammar_problems",
 }
 

@@ -52,3 +52,25 @@ def test_commands_in_the_docs_are_commands(page):
     for block in re.findall(r"```(?:sh|bash|console)\n(.*?)```", page.read_text(), re.S):
         for stage in re.findall(r"(?:^|[|&;]\s*|\$ )facade (?:-\S+ )*([a-z][a-z-]*)", block, re.M):
             assert stage in STAGES, f"{page.name}: facade {stage}"
+
+
+def _commands(page):
+    """Yield stage and options of every `facade` command that a page's blocks show."""
+    for block in re.findall(r"```(?:sh|bash|console)\n(.*?)```", page.read_text(), re.S):
+        for command in re.split(r"[|;&\n]", block.replace("\\\n", " ")):
+            match = re.match(r"\s*\$?\s*facade (?:-\S+ )*([a-z][a-z-]*)(.*)", command)
+            if match and match.group(1) in STAGES:
+                yield match.group(1), re.findall(r"(?<![\w-])--[a-z][\w-]*", match.group(2))
+
+
+def test_options_in_the_docs_are_options(facade_here):
+    shown = {}
+    for page in PAGES:
+        for stage, options in _commands(page):
+            if stage not in shown:
+                shown[stage] = facade_here(stage, "--help").stdout.decode()
+            for option in options:
+                assert re.search(rf"{option}\b(?!-)", shown[stage]), (
+                    f"{page.name}: {stage} {option}"
+                )
+    assert len(shown) > 10

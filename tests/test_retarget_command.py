@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -152,3 +153,42 @@ def test_jobs_change_no_byte(facade_here, sheet, tmp_path):
         assert facade_here("retarget", sheet, *bases, "-o", out, "--jobs", jobs).returncode == 0
     for path in (tmp_path / "1").iterdir():
         assert path.read_bytes() == (tmp_path / "2" / path.name).read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (lambda d: d.update(walls=[]), "/walls: expected one front wall of block 'block-0'"),
+        (lambda d: d["walls"][0]["faces"][0].update(floor=99), "/walls/0/faces/0/floor: no floor"),
+        (lambda d: d["walls"][0]["faces"][0].update(vertical="h0"), "no such vertical group: 'h0'"),
+        (lambda d: d["walls"][0]["faces"][0].update(top=-1), "/walls/0/faces/0: expected a width"),
+        (lambda d: d["floors"][0].update(cells=["11"]), "/floors/0/cells: expected a cell"),
+        (lambda d: d["floors"][0]["xs"].reverse(), "/floors/0/xs: expected numbers that increase"),
+        (lambda d: d["floors"][0].update(bottom=9e3), "/floors/0: expected its top above"),
+        (lambda d: d["rules"][0].update(a=[0.0], b=[]), "/rules/0: expected one scalable"),
+    ],
+)
+def test_sheets_that_contradict_themselves_are_refused(
+    facade_here, sheet, tmp_path, change, expected
+):
+    style = tmp_path / "style"
+    shutil.copytree(sheet, style)
+    document = json.loads((style / "stylesheet.json").read_text())
+    change(document)
+    (style / "stylesheet.json").write_text(json.dumps(document))
+    for words in (
+        ("retarget", style, style / "blocks.json", "-o", tmp_path / "x.glb"),
+        ("validate", style / "stylesheet.json"),
+    ):
+        done = facade_here(*words)
+        assert done.returncode == 3
+        assert expected in done.stdout.decode() + done.stderr.decode()
+
+
+def test_a_sheet_beside_blocks_of_another_model_is_refused(facade_here, sheet, tmp_path):
+    style = tmp_path / "style"
+    shutil.copytree(sheet, style)
+    base_file(style / "blocks.json")
+    done = facade_here("retarget", style, style / "blocks.json", "-o", tmp_path / "x.glb")
+    assert done.returncode == 3
+    assert b"blocks.json: /blocks: no block 'block-0', which stylesheet.json has" in done.stderr

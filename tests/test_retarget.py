@@ -142,7 +142,19 @@ def test_sign_boards_and_mouldings_are_no_storeys():
     target = replace(style.blocks, blocks=(replace(own, height=20.0),))
     floors = [floor for floor in style.sheet.floors if floor.block == own.id]
     assert len(floors) > 4
-    assert len(placed_blocks(style.sheet, style.blocks, target)[0].storeys) == len(floors)
+    placed = placed_blocks(style.sheet, style.blocks, target)[0].storeys
+    assert len(placed) == len(floors)
+    before = np.array([floor.top - floor.bottom for floor in floors])
+    after = np.array([storey.top - storey.bottom for storey in placed])
+    boards = before < 2
+    assert after[boards] == pytest.approx(before[boards])
+    assert after.sum() == pytest.approx(20)
+    stretch = after[~boards] / before[~boards]
+    assert stretch == pytest.approx(stretch[0])
+    lower = replace(style.blocks, blocks=(replace(own, height=6.0),))
+    squeezed = placed_blocks(style.sheet, style.blocks, lower)[0].storeys
+    heights = np.array([storey.top - storey.bottom for storey in squeezed])
+    assert heights == pytest.approx(before * 6 / before.sum())
 
 
 # --- overhangs, snapping, re-assignment -----------------------------------------------------------

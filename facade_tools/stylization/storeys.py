@@ -9,6 +9,7 @@ import numpy as np
 
 from ..artifacts.blocks import Block
 from ..artifacts.stylesheet import StyleBlock, StyleFloor, StyleSheet
+from ..geometry.arrays import Floats
 from .remesh import Slab, plan_difference
 
 SAME = 0.02  # share of the plan, of the height: storeys that differ less are one storey repeated
@@ -48,11 +49,25 @@ def storeys(sheet: StyleSheet, source: StyleBlock, block: Block) -> tuple[Storey
         inner = [floors[first + k % (unit * repeats)] for k in range(unit * wanted)]
         order = [*floors[:first], *inner, *floors[first + unit * repeats :]]
     heights = np.array([sheet.floors[i].top - sheet.floors[i].bottom for i in order])
-    levels = block.z + np.concatenate([[0.0], np.cumsum(heights)]) * block.height / heights.sum()
+    even = heights * block.height / heights.sum()
+    stretched = even if repeats > 1 else _stretched(heights, block.height)
+    levels = block.z + np.concatenate([[0.0], np.cumsum(stretched)])
     return tuple(
         Storey(floor, float(bottom), float(top))
         for floor, bottom, top in zip(order, levels[:-1], levels[1:], strict=True)
     )
+
+
+def _stretched(heights: Floats, target: float) -> Floats:
+    """Return the heights (m) of slabs, none of them repeated, that fill a target.
+
+    Where storeys make up most of a block that grows, sign boards and mouldings keep their height.
+    """
+    high = heights >= LEAST_STOREY
+    low = float(heights[~high].sum())
+    if target > heights.sum() and heights[high].sum() > MOSTLY * heights.sum():
+        return np.where(high, heights * (target - low) / heights[high].sum(), heights)
+    return np.asarray(heights * target / heights.sum())
 
 
 def _run_of_storeys(sheet: StyleSheet, floors: Sequence[int]) -> tuple[int, int, int]:

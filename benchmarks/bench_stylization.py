@@ -93,7 +93,8 @@ def _seen(
     picture = np.full((count, count, 3), 255, dtype=np.uint8)
     nearest = np.full((count, count), 1e9)
     uv = np.where(np.isfinite(mesh.uv), mesh.uv, 0.0)
-    _rasterise(view, uv, mesh.paint, paints.pixels, paints.table, picture, nearest)
+    colours = paints.pixels, paints.table, paints.holes
+    _rasterise(view, uv, mesh.paint, *colours, picture, nearest)
     return picture
 
 

@@ -1,4 +1,7 @@
-"""PLY and COLLADA with concave polygons, SGI pictures: read by our own readers, never fanned."""
+"""PLY and COLLADA with concave polygons, SGI pictures: read by our own readers, never fanned.
+
+STL and OFF, which hold triangles alone.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ import struct
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
@@ -14,6 +18,7 @@ from test_textured_dirt import png
 
 from facade_tools.errors import InvalidInput
 from facade_tools.formats.mesh_reader import read_textured
+from facade_tools.formats.textured import GREY
 from facade_tools.imaging.image_io import decoded
 
 # a U in plan as one concave polygon, and a wall under it; uv is the place on the plan over 10
@@ -263,3 +268,30 @@ def test_a_damaged_sgi_is_refused_or_read(data):
     except InvalidInput:
         return
     assert found.dtype == np.uint8
+
+
+@pytest.mark.parametrize("ending", [".stl", ".off", ".STL"])
+def test_triangles_alone_are_read_closed_and_in_grey(tmp_path, ending):
+    path = tmp_path / f"box{ending}"
+    box = trimesh.creation.box((2.0, 3.0, 4.0))
+    data = box.export(file_type=ending[1:].lower())
+    path.write_bytes(data.encode() if isinstance(data, str) else data)
+    mesh = read_textured(path)
+    solid = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    assert solid.is_watertight
+    assert solid.volume == pytest.approx(24.0)
+    assert [paint.color for paint in mesh.paints] == [GREY]
+    assert any("no texture" in note for note in mesh.notes)
+
+
+@pytest.mark.parametrize(("name", "data"), [
+    ("x.stl", b""), ("x.stl", b"solid x\nendsolid x\n"), ("x.stl", b"\0" * 80 + b"\xff" * 4),
+    ("x.off", b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n"), ("x.off", b"OFF\n"),
+    ("x.off", b"\xff\xfe"),
+    ("x.off", b"OFF\n3 1 0\n0 0 nan\n1 0 0\n0 1 0\n3 0 1 2\n"),
+])  # fmt: skip
+def test_triangles_that_are_none_are_refused_with_their_file(tmp_path, name, data):
+    path = tmp_path / name
+    path.write_bytes(data)
+    with pytest.raises(InvalidInput, match=str(path)):
+        read_textured(path)

@@ -7,20 +7,21 @@ from pathlib import Path
 
 from ..errors import InvalidInput
 from .textured import TexturedMesh
+from .textured_bare import read_bare
 from .textured_dae import Y_UP, read_dae
 from .textured_gltf import read_gltf
 from .textured_obj import read_obj
 from .textured_ply import read_ply
 
 READERS = {".obj": read_obj, ".glb": read_gltf, ".gltf": read_gltf, ".ply": read_ply}
-READERS |= {".dae": read_dae}
+READERS |= {".dae": read_dae, ".stl": read_bare, ".off": read_bare}
 ENDINGS = tuple(READERS)
 
 
 def read_textured(path: Path) -> TexturedMesh:
     """Return the textured mesh of a file, z up where the format says which way is up, in metres.
 
-    glTF is y up in metres; COLLADA says its unit and axis; OBJ and PLY say neither.
+    glTF is y up in metres; COLLADA says its unit and axis; the others say neither.
     """
     ending = path.suffix.lower()
     if ending not in ENDINGS:

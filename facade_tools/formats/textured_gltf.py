@@ -1,4 +1,8 @@
-"""glTF 2.0, binary or not, as exporters write it: every instance in its place, base colours."""
+"""glTF 2.0, binary or not, as exporters write it: every instance in its place, base colours.
+
+Our own, because the readers that there are drop what a facade is drawn with: transforms and second
+coordinates of textures, colours of corners, holes.
+"""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ from facade_tools.artifacts.building import Box, Building, Roof
 from facade_tools.artifacts.footprint import Footprint
 from facade_tools.artifacts.store import read
 from facade_tools.errors import InvalidInput
-from facade_tools.geometry.polygons import oriented, shape_of
+from facade_tools.geometry.polygons import oriented, shape_of, signed_area, sound
 from facade_tools.geometry.roofs import union_patches
 from facade_tools.geometry.solids import Label, Solid, building_solid, footprint_solid, triangulated
 from facade_tools.geometry.solids_merge import Piece, merged
@@ -146,6 +146,43 @@ def test_roofs_on_random_plans_close(kind: str, style: str) -> None:
         vertices, triangles, _ = triangulated(footprint_solid(footprint))
         assert closed_and_outward(vertices, triangles)
         assert volume_of(vertices, triangles) > 0
+
+
+@pytest.mark.parametrize("style", catalogue.ROOF_STYLES)
+@pytest.mark.parametrize("jog", [1e-3, 1e-5, 2e-6, 1e-6])
+def test_walls_that_jog_by_micrometres_leave_no_hole(style: str, jog: float) -> None:
+    """Seen flat, two corners of a steep sliver fall together; they are two nevertheless."""
+    ring = [(0, 10), (7.32, 10), (7.32, 10 - jog), (7.6044, 10 - jog), (7.6044, 10), (20, 10)]
+    turn = np.radians(8.33)
+    spun = np.array([*ring, (20, 0), (0, 0)]) @ np.array(
+        [[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]
+    )
+    for corners in (np.array([*ring, (20, 0), (0, 0)]), spun):
+        outline = tuple(map(tuple, corners.tolist()))
+        footprint = Footprint("f", (outline,), 6.0, catalogue.roofed(style, 60.0))
+        vertices, triangles, _ = triangulated(footprint_solid(footprint))
+        assert closed_and_outward(vertices, triangles)
+
+
+@pytest.mark.parametrize(("corners", "radius"), [(9, 12.0), (37, 8.0), (46, 10.0)])
+def test_mansard_round_a_court_whose_skeleton_crosses_itself_by_rounding(
+    corners: int, radius: float
+) -> None:
+    angles = 2 * np.pi * np.arange(corners) / corners
+    outer = radius * np.column_stack([np.cos(angles), np.sin(angles)])
+    rings = tuple(tuple(map(tuple, ring.tolist())) for ring in (outer, 0.4 * outer))
+    footprint = Footprint("f", rings, 6.0, Roof("mansard", 30.0))
+    vertices, triangles, _ = triangulated(footprint_solid(footprint))
+    assert closed_and_outward(vertices, triangles)
+    assert volume_of(vertices, triangles) > 6.5 * shapely.Polygon(*rings[:1], rings[1:]).area
+
+
+def test_outline_with_a_crossing_and_a_spike_keeps_its_area() -> None:
+    """Its repair is a collection that holds a collection of polygons and a line."""
+    bow = [(0, 0), (10, 0), (10, 8), (12, 8), (10, 8), (10, 9), (5, 9), (5, 14), (6, 14), (0, 4)]
+    shape = shapely.make_valid(shapely.Polygon(bow))
+    assert {part.geom_type for part in shapely.get_parts(shape)} == {"MultiPolygon", "LineString"}
+    assert sum(map(signed_area, (rings[0] for rings in sound([bow])))) == pytest.approx(shape.area)
 
 
 def test_slivers_and_pinched_loops_leave_no_hole() -> None:

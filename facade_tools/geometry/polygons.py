@@ -57,5 +57,5 @@ def sound(rings: Sequence[Sequence[Sequence[float]] | Points2], grid: float = 1e
     outer, *holes = [shapely.make_valid(shapely.Polygon(loop)) for loop in loops]
     shape = shapely.difference(outer, shapely.union_all(holes)) if holes else outer
     shape = shapely.set_precision(shape, grid)
-    parts = [part for part in shapely.get_parts(shape) if isinstance(part, shapely.Polygon)]
+    parts = shapely.get_parts(shapely.get_parts(shape))  # of a collection that holds collections
     return [rings_of(part) for part in parts if part.area > 0]

@@ -11,6 +11,7 @@ from facade_tools.artifacts.building import Roof
 from facade_tools.artifacts.footprint import Footprint
 
 from .polygons import Rings, rings_of, sound
+from .rectilinear import valid_polygon
 from .roofs_gables import gable_ends, turns
 from .roofs_patch import FLAT, Patch, Plane, mansard_profile, slope_of
 from .skeleton import Contour, Skeleton, SkeletonFailed, straight_skeleton
@@ -152,8 +153,7 @@ def truncated(
     reach = 2.0 * float(np.ptp(skeleton.points, axis=0).sum())
     found = []
     for k in range(len(skeleton.faces)):
-        outer, *holes = skeleton.polygon(k)
-        shape = shapely.Polygon(outer, holes)
+        shape = valid_polygon(skeleton.polygon(k))  # nodes a micrometre apart may cross
         far, side = reach * normal[k], reach * along[k]
         level = contour.points[k] + time * contour.speeds[k] * normal[k]
         above = shapely.Polygon(

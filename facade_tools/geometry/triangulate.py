@@ -35,6 +35,14 @@ def triangulate_rings(rings: Sequence[Points2]) -> Triangles:
     an edge of exactly one triangle, also where points lie in one line (earcut alone drops such
     points). Points at one place, where rings touch, are taken as one.
     """
+    points = np.concatenate(rings)
+    _, first, place = np.unique(points, axis=0, return_index=True, return_inverse=True)
+    triangles = _triangles(rings)
+    return triangles if len(first) == len(points) else _named(triangles, first[place.ravel()])
+
+
+def _triangles(rings: Sequence[Points2]) -> Triangles:
+    """Return triangles over the points, of which those at one place stay apart."""
     points = np.ascontiguousarray(np.concatenate(rings), dtype=np.float64)
     ends = np.cumsum([len(ring) for ring in rings]).astype(np.uint32)
     points = points - points.min(axis=0)
@@ -46,8 +54,7 @@ def triangulate_rings(rings: Sequence[Points2]) -> Triangles:
     whole = len(triangles) == len(points) + 2 * len(rings) - 4
     if not (whole and _covers(points, ends, triangles) and _pair(triangles, len(points))):
         order = _counter_clockwise(points, ends)
-        ears = clipped_ears(points[order], ends.astype(np.int64))
-        return _without_copies(points, order[ears])
+        return order[clipped_ears(points[order], ends.astype(np.int64))]
     return triangles
 
 
@@ -75,10 +82,9 @@ def _covers(points: Points2, ends: NDArray[np.uint32], triangles: Triangles) -> 
     return bool(areas.min(initial=np.inf) > 0 and abs(areas.sum() - whole) <= 1e-9 * abs(whole))
 
 
-def _without_copies(points: Points2, triangles: Triangles) -> Triangles:
-    """Let points at one place be one (where rings touch), and drop triangles that vanish."""
-    _, first, place = np.unique(points, axis=0, return_index=True, return_inverse=True)
-    triangles = first[place.ravel()][triangles]
+def _named(triangles: Triangles, names: Integers) -> Triangles:
+    """Return triangles under the names of their points, without those that vanish."""
+    triangles = names[triangles]
     a, b, c = triangles.T
     return np.asarray(triangles[(a != b) & (b != c) & (c != a)], dtype=np.int64)
 
@@ -96,5 +102,6 @@ def triangulate_face(vertices: Points3, rings: Sequence[Integers]) -> Triangles:
         return np.asarray(rings[0], dtype=np.int64).reshape(1, 3)
     index = np.concatenate([np.asarray(ring, dtype=np.int64) for ring in rings])
     normal = newell_normal(vertices[np.asarray(rings[0], dtype=np.int64)])
-    local = triangulate_rings([flattened(vertices[list(ring)], normal) for ring in rings])
-    return index[local]
+    # Which points are one, their vertices say: seen flat, others fall together too.
+    flat = [flattened(vertices[list(ring)], normal) for ring in rings]
+    return _named(_triangles(flat), index)

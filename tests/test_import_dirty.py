@@ -390,3 +390,21 @@ def test_prose_is_no_table(text: str) -> None:
 def test_a_prefix_of_the_name_space_does_not_hide_hpxml() -> None:
     assert hpxml.detect(b'<?xml version="1.0"?>\n<h:HPXML xmlns:h="x">')
     assert not hpxml.detect(b"<NotHPXML/>")
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_thousands_of_parts_below_one_another_are_one_building(order: int) -> None:
+    city = document()
+    (root,) = city["CityObjects"]
+    house = city["CityObjects"].pop(root)
+    count = 3000
+    chain = {
+        f"p{k}": {"type": "BuildingPart", "parents": [f"p{k - 1}" if k else root]}
+        for k in range(count)
+    }
+    for k in range(count - 1):
+        chain[f"p{k}"]["children"] = [f"p{k + 1}"]
+    rows = [(root, {**house, "children": ["p0"]}), *chain.items()]
+    city["CityObjects"] = dict(rows[::order])
+    found, _ = read(json.dumps(city).encode())
+    assert [building.id for building in found] == [root]

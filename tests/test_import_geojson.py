@@ -218,7 +218,7 @@ def test_a_building_in_parts_is_its_parts(lines: bool) -> None:
         {"cap": 18.0, "low": 6.096, "tower": 15.0, "lone": 7.0}
     )
     assert {house.tags.get("part_of") for house in found} == {"house", None}
-    assert notes["building part that begins above the ground: carried down to it"] == 1
+    assert notes["begins above the ground: carried down to it"] == 1
 
 
 def test_a_building_in_parts_becomes_boxes_of_their_heights() -> None:
@@ -280,3 +280,115 @@ def test_footprints_become_boxes_on_request() -> None:
     assert len(house.boxes) == 2
     assert house.tags["plan_residual"] == 0.0
     assert not list(building_problems(house))
+
+
+@pytest.mark.parametrize(
+    ("shape", "style"),
+    [("lean_to", "shed"), ("Side_Hipped", "hip"), ("cross_gabled;flat", "gable"), ("shed", "shed")],
+)
+def test_rarer_shapes_of_roofs_are_built(shape: str, style: str) -> None:
+    (found,), notes = read(feature(height=9, **{"roof:shape": shape}), metres=True)
+    assert (found.roof.style, notes) == (style, Counter())
+
+
+@pytest.mark.parametrize(
+    ("tag", "value"),
+    [
+        ("height", "-1"),
+        ("height", "tall"),
+        ("building:levels", "1-2"),
+        ("roof:height", "3 storeys"),
+        ("roof:direction", "uphill"),
+    ],
+)
+def test_what_cannot_be_read_is_counted_by_its_tag(tag: str, value: str) -> None:
+    tags = {"building:levels": "2", "roof:shape": "gabled"}
+    plain, _ = read(feature(**{**tags, tag: None}), metres=True)
+    found, notes = read(feature(**{**tags, tag: value}), metres=True)
+    assert notes[f"{tag} cannot be read: taken as not stated"] == 1
+    assert (found[0].height, found[0].roof) == (plain[0].height, plain[0].roof)
+
+
+def test_shape_of_a_roof_that_is_none_is_flat_and_counted() -> None:
+    (found,), notes = read(feature(height=9, **{"roof:shape": "sawtooth"}), metres=True)
+    assert (found.height, found.roof.style) == (9.0, "flat")
+    assert notes == {"roof:shape is none that is built: flat": 1}
+
+
+@pytest.mark.parametrize("bearing", ["west", "WEST", "270°", "270 degrees", "-90", "W"])
+def test_directions_in_words(bearing: str) -> None:
+    plan = shapely.box(0, 0, 12, 8)
+    notes: Counter[str] = Counter()
+    tags = {"height": 9, "roof:shape": "gabled", "roof:direction": bearing}
+    assert shape_of(tags, plan, 0.0, notes).roof.direction == "y"
+    assert not notes
+
+
+def test_keys_in_order_put_the_type_behind_the_features() -> None:
+    many = [{**feature(note="x" * 70_000), "id": k} for k in range(3)]
+    data = json.dumps({"features": many, "type": "FeatureCollection"}, indent=1, sort_keys=True)
+    options = ReadOptions(metres=True)
+    assert len(list(geojson.records(io.BytesIO(data.encode()), options))) == 3
+    line = json.dumps({"features": many, "type": "FeatureCollection"})
+    assert len(list(geojson.records(io.BytesIO(line.encode()), options))) == 3
+
+
+def test_a_sliver_beside_the_house_does_not_refuse_it() -> None:
+    sliver = [[20, 0], [21, 0], [21, 1], [20, 0]]
+    both = feature()
+    both["geometry"] = {"type": "MultiPolygon", "coordinates": [[sliver], [RECTANGLE]]}
+    (found,), notes = read(both, metres=True)
+    assert found.id == "way/1"
+    assert notes["piece smaller than 4 m² beside others: left out"] == 1
+    both["geometry"]["coordinates"] = [[sliver], [sliver]]
+    with pytest.raises(InvalidInput, match="none of 4 m²"):
+        read(both, metres=True)
+
+
+def test_a_part_of_two_square_metres_stays_a_part() -> None:
+    turret = feature([[1, 1], [2.5, 1], [2.5, 2.5], [1, 2.5]], height=12)
+    turret["properties"] = {"building:part": "yes", "height": 12}
+    turret["id"] = "way/2"
+    found, _ = read(feature(height=6), turret, metres=True)
+    assert sorted((row.id, row.height) for row in found) == [("way/1", 6.0), ("way/2", 12.0)]
+
+
+def test_both_sides_of_the_date_line_share_a_system() -> None:
+    west = [[179.9998, -16.5], [179.9999, -16.5], [179.9999, -16.4999], [179.9998, -16.4999]]
+    east = [[x - 359.9998, y] for x, y in west]
+    found, _ = read(feature(west), {**feature(east), "id": "way/2"})
+    assert len({row.frame.crs for row in found}) == 1
+    assert abs(found[0].frame.shift[0] - found[1].frame.shift[0]) < 30.0
+
+
+@pytest.mark.parametrize("opening", ["[", '{"a":'])
+def test_nesting_without_end_is_refused_in_bounded_memory(opening: str) -> None:
+    closing = "]" if opening == "[" else "}"
+    bomb = opening * 100_000 + "1" + closing * 100_000
+    text = json.dumps({"type": "FeatureCollection", "features": [feature(bomb="BOMB")]})
+    with pytest.raises(InvalidInput, match="nested deeper than 500 levels"):
+        list(geojson.records(io.BytesIO(text.replace('"BOMB"', bomb).encode()), ReadOptions()))
+
+
+@given(
+    st.lists(st.sampled_from(['"', "\\", "[", "{", "]", "é", "a"]), max_size=40), st.integers(1, 9)
+)
+def test_brackets_in_strings_are_no_levels(letters: list[str], size: int) -> None:
+    """Whatever stands in strings, and wherever a block ends, the depth is that of the brackets."""
+    from facade_tools.formats.json_stream import _Shallow
+
+    data = json.dumps([["".join(letters)], {"".join(letters): [1]}]).encode()
+    stream = _Shallow(io.BytesIO(data))
+    while stream.read(size):
+        pass
+    assert (stream._depth, stream._quotes) == (0, 0)
+
+
+def test_text_that_is_not_utf_8_is_refused_in_one_line() -> None:
+    text = json.dumps(
+        {"type": "FeatureCollection", "features": [feature(name="ß")]}, ensure_ascii=False
+    )
+    with pytest.raises(
+        InvalidInput, match=r"^not valid JSON: lexical error: invalid bytes in UTF8 string\.$"
+    ):
+        list(geojson.records(io.BytesIO(text.encode("latin-1")), ReadOptions()))

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Any, BinaryIO
-
-import ijson
 
 from ..artifacts.documents import parse_json
 from ..errors import InvalidInput
 from . import models
 from .cityjson_geometry import Header, Vertices, kind_of, model_of
+from .json_stream import pairs, values
 from .reading import Built, ReadOptions, Record, without_mark
 from .surfaces import Model
 
@@ -107,13 +107,10 @@ class _Document:
     def __init__(self, stream: BinaryIO, start: int) -> None:
         """Read transform, reference system, templates and vertices."""
         self.stream, self.start = stream, start
-        try:
-            templates = self._value("geometry-templates") if self._has_templates() else None
-            self.header = Header.of(self._value("transform"), self._value("metadata"), templates)
-            stream.seek(start)
-            self.vertices = Vertices(ijson.items(stream, "vertices.item", use_float=True))
-        except ijson.JSONError as error:
-            raise InvalidInput(_reason(error)) from None
+        templates = self._value("geometry-templates") if self._has_templates() else None
+        self.header = Header.of(self._value("transform"), self._value("metadata"), templates)
+        stream.seek(start)
+        self.vertices = Vertices(values(stream, "vertices.item"))
 
     def _has_templates(self) -> bool:
         self.stream.seek(self.start)
@@ -126,20 +123,15 @@ class _Document:
 
     def _value(self, name: str) -> Any:
         self.stream.seek(self.start)
-        return next(ijson.items(self.stream, name, use_float=True), None)
+        return next(values(self.stream, name), None)
 
     def __call__(self) -> Iterator[Model | InvalidInput]:
         """Yield the models of all buildings."""
         self.stream.seek(self.start)
-        objects = ijson.kvitems(self.stream, "CityObjects", use_float=True)
         try:
-            yield from _grouped(objects, self.header, self.vertices)
-        except ijson.JSONError as error:
-            yield InvalidInput(_reason(error))
-
-
-def _reason(error: Exception) -> str:
-    return "not valid JSON: {}".format(str(error).split("\n")[0])
+            yield from _grouped(pairs(self.stream, "CityObjects"), self.header, self.vertices)
+        except InvalidInput as error:
+            yield error
 
 
 # --- city objects ---------------------------------------------------------------------------------
@@ -147,7 +139,7 @@ def _grouped(
     objects: Iterator[tuple[str, Any]], header: Header, vertices: Vertices
 ) -> Iterator[Model | InvalidInput]:
     """Yield a model a root building as soon as all its children were read."""
-    waiting: dict[str, dict[str, Any]] = {}  # root -> its objects so far
+    waiting: dict[str, _Group] = {}  # root -> its objects so far
     root_of: dict[str, str] = {}
     orphans: dict[str, Any] = {}
     for name, item in objects:
@@ -161,14 +153,14 @@ def _grouped(
         if root is None:
             orphans[name] = item
             continue
-        done = _take(name, item, root, waiting, root_of, orphans)
-        if done:
-            members = waiting.pop(root)
-            for member in members:
+        group = waiting.setdefault(root, _Group())
+        root_of.update(dict.fromkeys(group.take(name, item, orphans), root))
+        if not group.missing:
+            for member in waiting.pop(root).members:
                 root_of.pop(member, None)
-            yield _model(root, members, header, vertices)
-    for root, members in waiting.items():
-        yield _model(root, members, header, vertices)
+            yield _model(root, group.members, header, vertices)
+    for root, group in waiting.items():
+        yield _model(root, group.members, header, vertices)
     for name, item in orphans.items():
         if kind_of(item) == "BuildingPart":
             yield _model(name, {name: item}, header, vertices)
@@ -176,24 +168,26 @@ def _grouped(
             yield InvalidInput("its parent is not in the file", pointer=f"/CityObjects/{name}")
 
 
-def _take(
-    name: str,
-    item: dict[str, Any],
-    root: str,
-    waiting: dict[str, dict[str, Any]],
-    root_of: dict[str, str],
-    orphans: dict[str, Any],
-) -> bool:
-    """Add an object and its known children to its root; tell whether the root is complete."""
-    members = waiting.setdefault(root, {})
-    members[name] = item
-    root_of[name] = root
-    for child in item.get("children") or []:
-        root_of[str(child)] = root
-        if child in orphans:
-            _take(str(child), orphans.pop(child), root, waiting, root_of, orphans)
-    wanted = {str(child) for member in members.values() for child in member.get("children") or []}
-    return wanted <= members.keys() and root in members
+@dataclass
+class _Group:
+    """The objects of a root building that were read, and the ids of those that were not."""
+
+    members: dict[str, Any] = field(default_factory=dict)
+    missing: set[str] = field(default_factory=set)
+
+    def take(self, name: str, item: dict[str, Any], orphans: dict[str, Any]) -> list[str]:
+        """Add an object and all below it that wait; return the ids that now belong here."""
+        found = []
+        rows = [(name, item)]
+        while rows:
+            name, item = rows.pop()
+            self.members[name] = item
+            self.missing.discard(name)
+            children = [str(child) for child in item.get("children") or []]
+            self.missing.update(child for child in children if child not in self.members)
+            found += [name, *children]
+            rows += [(child, orphans.pop(child)) for child in children[::-1] if child in orphans]
+        return found
 
 
 def _model(

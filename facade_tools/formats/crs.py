@@ -114,12 +114,14 @@ def cell_of(plan: Points2) -> tuple[float, float]:
 
     >>> cell_of(np.array([[11.43, 48.76]]))
     (11.5, 48.75)
+    >>> cell_of(np.array([[-179.99, -16.5]])) == cell_of(np.array([[179.99, -16.5]]))
+    True
     """
     if not len(plan):
         return 0.0, 0.0
     middle = (plan.min(axis=0) + plan.max(axis=0)) / 2.0
     longitude, latitude = (np.round(middle / CELL) * CELL).tolist()
-    return longitude, latitude
+    return (longitude + 180.0) % 360.0 - 180.0, latitude
 
 
 def _look_like_degrees(points: Points3, offset: Floats) -> bool:

@@ -8,7 +8,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, BinaryIO
 
-import ijson
 import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
@@ -21,13 +20,15 @@ from ..geometry.arrays import Points2
 from ..geometry.rectilinear import areas, main_direction, partition, rotated, valid_polygon
 from .crs import System
 from .geojson_parts import MARK, Feature, Part, polygons_of, tags_of, with_parts
-from .osm import Shape, is_building, length, shape_of
+from .json_stream import values
+from .osm import Shape, is_building, shape_of
 from .reading import BY_NAME, HEAD_BYTES, Built, ReadOptions, Record, read_whole, without_mark
 
 GEOMETRIES = "Polygon|MultiPolygon|GeometryCollection"
 TYPE = re.compile(rf'"type"\s*:\s*"(FeatureCollection|Feature|{GEOMETRIES})"'.encode())
 CRS = re.compile(rb'"crs"\s*:\s*\{.{0,200}?"name"\s*:\s*"([^"]{1,200})"', re.S)
-LEAST_AREA, LARGEST = 4.0, 2000.0  # m², metres
+LAST_TYPE = re.compile(rb'\]\s*,\s*"type"\s*:\s*"FeatureCollection"\s*\}\s*$')
+LEAST_AREA, LEAST_PART, LARGEST = 4.0, 1.0, 2000.0  # m², m², metres
 LONGEST_LINE = 64 << 20
 LEFT_OVER = 0.1  # of an outline: what no part covers and is larger stays a footprint
 RECORD_MARK = b"\x1e"
@@ -53,12 +54,14 @@ class _Source:
         head = stream.read(HEAD_BYTES)
         size = stream.seek(0, 2)
         stream.seek(max(size - HEAD_BYTES, self.start))
-        match = CRS.search(head) or CRS.search(stream.read())
+        tail = stream.read()
+        match = CRS.search(head) or CRS.search(tail)
         named = match[1].decode("utf-8", "replace") if match else ""
         system = System.of(named) if named else System("", degrees=True)
         self.system = replace(system, degrees=False, metres=1.0) if options.metres else system
         first = head.lstrip(RECORD_MARK + b" \t\r\n").split(b"\n")[0].rstrip()
-        self.collection = b'"FeatureCollection"' in head
+        # Where keys are sorted, the type stands behind the features.
+        self.collection = b'"FeatureCollection"' in head or LAST_TYPE.search(tail) is not None
         self.lines = not self.collection and (first.endswith(b"}") or len(first) == len(head))
 
     def mentions(self, word: bytes) -> bool:
@@ -85,12 +88,8 @@ class _Source:
             yield Record(Feature(value, self.system), pointer="/0")
 
     def _items(self) -> Iterator[Record]:
-        try:
-            items = ijson.items(self.stream, "features.item", use_float=True)
-            for index, value in enumerate(items):
-                yield Record(Feature(value, self.system), pointer=f"/features/{index}")
-        except ijson.JSONError as error:
-            raise InvalidInput(f"not valid JSON: {str(error).splitlines()[0]}") from None
+        for index, value in enumerate(values(self.stream, "features.item")):
+            yield Record(Feature(value, self.system), pointer=f"/features/{index}")
 
     def _lines(self) -> Iterator[Record]:
         number = 1
@@ -118,10 +117,13 @@ def build(record: Record, options: ReadOptions) -> Built:
     boxes = options.kind in ("buildings", "attributes")
     found: list[Footprint | Building] = []
     for index, rings in enumerate(polygons):
-        name = identity if index == 0 else f"{identity}-{index + 1}"
+        name = f"{identity}-{index + 1}" if found else identity
         parts = payload.parts if index == 0 else ()
         shapes = [rings, *(part.rings for part in parts)]
         (polygon, *others), origin, crs = _localised(shapes, payload.system, notes)
+        if polygon.area < LEAST_AREA and len(polygons) > 1:
+            notes["piece smaller than 4 m² beside others: left out"] += 1
+            continue
         site = _Site.of(polygon, origin, crs)
         rows: list[Row] = [(name, polygon, tags)]
         if parts:
@@ -132,10 +134,14 @@ def build(record: Record, options: ReadOptions) -> Built:
             ]
             found.append(_boxed(name, masses, site.frame, tags))
         else:
-            sites = [site if p is polygon else _Site.of(p, origin, crs) for _, p, _ in rows]
+            sites = [
+                site if p is polygon else _Site.of(p, origin, crs, LEAST_PART) for _, p, _ in rows
+            ]
             found += [
                 _footprint(n, at, p, t, notes) for at, (n, p, t) in zip(sites, rows, strict=True)
             ]
+    if not found:
+        raise InvalidInput("several polygons, none of 4 m²; expected a building (in metres?)")
     return Built(tuple(found), notes)
 
 
@@ -163,14 +169,16 @@ class _Site:
     frame: Frame
 
     @classmethod
-    def of(cls, polygon: BaseGeometry, origin: Points2, crs: str) -> _Site:
+    def of(
+        cls, polygon: BaseGeometry, origin: Points2, crs: str, least: float = LEAST_AREA
+    ) -> _Site:
         """Return the frame of a polygon in metres around an origin; raises InvalidInput."""
         if polygon.is_empty:
             raise InvalidInput("an outline without area; expected at least three corners")
         turn = main_direction(polygon)
         x0, y0, x1, y1 = rotated(polygon, -turn).bounds
         size = max(x1 - x0, y1 - y0)
-        if polygon.area < LEAST_AREA or size > LARGEST:
+        if polygon.area < least or size > LARGEST:
             text = f"{polygon.area:.2f} m², {size:.1f} m long"
             raise InvalidInput(f"{text}; expected a building of 4 m² to 2 km (in metres?)")
         middle = np.array([(x0 + x1) / 2.0, (y0 + y1) / 2.0])
@@ -239,11 +247,9 @@ def _in_parts(
     """
     rows: list[Row] = []
     for part, shape in parts:
-        if shape.area < LEAST_AREA / 4.0:
+        if shape.area < LEAST_PART:
             notes["building part smaller than 1 m²: left out"] += 1
             continue
-        if length(part.tags.get("min_height", part.tags.get("building:min_level", "0"))):
-            notes["building part that begins above the ground: carried down to it"] += 1
         rows.append((part.identity, shape, {**part.tags, "part_of": identity}))
     rest = areas(polygon.difference(shapely.union_all([shape for _, shape, _ in rows])))
     large = [

@@ -38,7 +38,24 @@ FEET = re.compile(
     re.I,
 )
 FOOT = 0.3048  # metres
+SHAPES: Mapping[str, RoofStyle] = {
+    **CODES,
+    "conical": "cone",
+    "cross-gabled": "gable",
+    "crosspitched": "gable",
+    "double-saltbox": "gable",
+    "hipped-and-gabled": "hip",
+    "lean-to": "shed",
+    "pitched": "gable",
+    "pyramid": "hip",
+    "quadruple-saltbox": "gable",
+    "shed": "shed",
+    "side-half-hipped": "hip",
+    "side-hipped": "hip",
+}
+READ = ("height", "building:levels", "roof:height", "roof:levels", "roof:angle", "roof:direction")
 COMPASS = ("N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE")
+QUARTERS = (("NORTH", "N"), ("EAST", "E"), ("SOUTH", "S"), ("WEST", "W"))
 COMPASS_SOUTH = ("S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW")
 
 
@@ -102,8 +119,8 @@ def shape_of(
     clockwise to get there. The tag `height` is the roof's top: the roof is subtracted, and where
     less than 2.5 m of wall would be left, its pitch is lowered.
     """
-    tags = canonical(tags)
-    style = _style(tags)
+    tags = _readable(canonical(tags), notes)
+    style = SHAPES[str(tags.get("roof:shape", "flat"))]
     direction = _direction(tags, plan, turn, style)
     span = _span(plan, style, direction)
     pitch = _pitch(tags, style, span)
@@ -122,8 +139,27 @@ def shape_of(
     return Shape(round(eaves, 6), Roof(style, round(pitch, 6), direction))
 
 
-def _style(tags: Mapping[str, object]) -> RoofStyle:
-    return CODES.get(str(tags.get("roof:shape", "flat")).lower(), "flat")
+def _readable(tags: Mapping[str, object], notes: Counter[str]) -> dict[str, object]:
+    """Return tags without those that say nothing that can be built, which are counted."""
+    found = {key: value for key, value in tags.items() if value not in (None, "")}
+    for name in READ:
+        value = found.get(name, 0)
+        if (_bearing(value) if name == "roof:direction" else length(_bare(value))) is None:
+            notes[f"{name} cannot be read: taken as not stated"] += 1
+            del found[name]
+    shape = re.sub(
+        r"[_ ]+", "-", str(found.get("roof:shape", "flat")).split(";")[0].strip().lower()
+    )
+    if shape not in SHAPES:
+        notes["roof:shape is none that is built: flat"] += 1
+        shape = "flat"
+    if length(found.get("min_height", found.get("building:min_level", 0))):
+        notes["begins above the ground: carried down to it"] += 1
+    return {**found, "roof:shape": shape}
+
+
+def _bare(value: object) -> str:
+    return re.sub(r"\s*(°|deg(rees?)?)$", "", str(value).strip(), flags=re.I)
 
 
 def _heights(tags: Mapping[str, object], notes: Counter[str]) -> tuple[float | None, float | None]:
@@ -142,7 +178,7 @@ def _heights(tags: Mapping[str, object], notes: Counter[str]) -> tuple[float | N
 def _pitch(tags: Mapping[str, object], style: RoofStyle, span: float) -> float:
     if style == "flat":
         return 0.0
-    angle = length(str(tags.get("roof:angle", "")).rstrip("° "))
+    angle = length(_bare(tags.get("roof:angle", "")))
     rise = length(tags.get("roof:height", ""))
     if rise is None and (levels := length(tags.get("roof:levels", ""))):
         rise = LEVEL_HEIGHT * levels
@@ -173,11 +209,15 @@ def _other(axis: Axis) -> Axis:
 
 
 def _bearing(value: object) -> float | None:
-    text = str(value).strip().rstrip("°")
+    text = _bare(value)
     points = COMPASS + COMPASS_SOUTH
-    if text.upper() in points:
-        return 22.5 * points.index(text.upper())
-    return length(text)
+    letters = re.sub(r"[-_ ]", "", text.upper())
+    for word, letter in QUARTERS:
+        letters = letters.replace(word, letter)
+    if letters in points:
+        return 22.5 * points.index(letters)
+    size = length(text.removeprefix("-"))
+    return -size if size and text.startswith("-") else size
 
 
 def _span(plan: BaseGeometry, style: RoofStyle, direction: Axis) -> float:

@@ -23,7 +23,7 @@ from ._items import each
 from ._lots import Ground, grounds
 from ._models import Made, Wanted, wanted, write_models
 from ._options import StreamOptions, finite
-from ._stream import refuse_overwriting, refuse_single, side_input
+from ._stream import Faults, refuse_overwriting, refuse_single, side_input
 
 NAME = "derive"
 
@@ -47,7 +47,9 @@ def run_derive(grammar: str, stream: StreamOptions, values: Mapping[str, Any]) -
     made = wanted(stream.output, values["tree"])
     maker = Maker(load(grammar), given, seed, provenance, made)
     tasks = _tasks(maker, values)
-    write_models(each(NAME, maker, stream, tasks), stream.output, values["tree"])
+    faults = Faults(NAME, stream.on_error)
+    write_models(each(maker, stream, faults, tasks), (stream.output, values["tree"]), faults)
+    faults.complain()
 
 
 def _value(text: str) -> tuple[str, float]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,7 +18,7 @@ from facade_tools.formats.exporting import ENDINGS, model_files, placed, vertex_
 
 from ._items import each, load
 from ._options import StreamOptions
-from ._stream import file_name, is_folder, new_file_name, refuse_overwriting
+from ._stream import Faults, file_name, is_folder, new_file_name, refuse_overwriting, to_stdout
 
 MOST_VERTICES = 30_000_000  # in one file: about 2 GB of memory
 
@@ -98,10 +97,16 @@ def _ending(output: str) -> str | None:
 
 
 def _to_folder(stream: StreamOptions, folder: Path, convert: Files) -> None:
-    seen: set[str] = set()
-    for identity, files in each("export", convert, stream):
-        new_file_name(identity, seen)
-        write_files(folder, files)
+    faults = Faults("export", stream.on_error)
+    seen: dict[str, str] = {}
+    for identity, files in each(convert, stream, faults):
+        try:
+            new_file_name(identity, seen)
+        except InvalidInput as error:
+            faults(error)
+        else:
+            write_files(folder, files)
+    faults.complain()
 
 
 def _to_file(stream: StreamOptions, path: Path, form: str | None, arrange: str) -> None:
@@ -110,9 +115,11 @@ def _to_file(stream: StreamOptions, path: Path, form: str | None, arrange: str) 
         raise click.UsageError(f"{path}: unknown ending; expected {known}, a folder, or --format")
     end = ENDINGS[form]
     stem = path.name[: -len(end)] if path.name.lower().endswith(end) else path.stem
-    files = model_files(_parts(stream, form, arrange), file_name(stem), form)
+    faults = Faults("export", stream.on_error)
+    files = model_files(_parts(stream, form, arrange, faults), file_name(stem), form)
     renamed = {_as_named(name, file_name(stem) + end, path): data for name, data in files.items()}
     write_files(path.parent, renamed)
+    faults.complain()
 
 
 def _as_named(name: str, main: str, path: Path) -> str:
@@ -122,13 +129,21 @@ def _as_named(name: str, main: str, path: Path) -> str:
 def _to_stdout(stream: StreamOptions, form: str, arrange: str) -> None:
     if form == "obj":
         raise click.UsageError("OBJ is several files; name a file or a folder with -o.")
-    (data,) = model_files(_parts(stream, form, arrange), "stdin", form).values()
-    sys.stdout.buffer.write(data)
+    faults = Faults("export", stream.on_error)
+    (data,) = model_files(_parts(stream, form, arrange, faults), "stdin", form).values()
+    to_stdout("stdin", data)
+    faults.complain()
 
 
-def _parts(stream: StreamOptions, form: str, arrange: str) -> list[Any]:
+def _parts(stream: StreamOptions, form: str, arrange: str, faults: Faults) -> list[Any]:
     parts, frames, size = [], [], 0
-    for part, frame in each("export", Part(form), stream):
+    names: set[str] = set()
+    for part, frame in each(Part(form), stream, faults):
+        if part.name in names:
+            text = f"id {part.name!r} stands twice; expected unique ids in one file"
+            faults(InvalidInput(text))
+            continue
+        names.add(part.name)
         parts.append(part)
         frames.append(frame)
         size += vertex_count(part)
@@ -136,10 +151,6 @@ def _parts(stream: StreamOptions, form: str, arrange: str) -> list[Any]:
             raise InvalidInput(
                 f"more than {MOST_VERTICES:,} vertices; export to a folder or fewer items at a time"
             )
-    names = [part.name for part in parts]
-    if len(set(names)) < len(names):
-        twice = next(name for name in names if names.count(name) > 1)
-        raise InvalidInput(f"id {twice!r} stands twice; expected unique ids in one file")
     arranged: list[Any] = placed(parts, arrange, frames)
     return arranged
 

@@ -93,7 +93,7 @@ class _Tally:
                 message = f"id {identity!r} stands twice; expected unique ids"
                 self.faults(InvalidInput(message, outcome.value.place))
                 continue
-            write(identity, data)
+            self.faults.guard(write, identity, data)
         self.kinds += outcome.value.kinds
         self.notes += outcome.value.notes
 

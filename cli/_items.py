@@ -25,19 +25,19 @@ def load(target: str) -> Callable[..., Any]:
 
 
 def each(
-    name: str,
     function: Callable[[Any], R],
     stream: StreamOptions,
+    faults: Faults,
     items: Iterable[Any] | None = None,
 ) -> Iterator[R]:
-    """Yield `function` of every item, in order, with progress and --on-error as asked for.
+    """Yield `function` of every item, in order, with progress; bad items go to `faults`.
 
-    items: default is all inputs of the stream. The last thing that it does after skipped items is
-    to raise InvalidInput.
+    items: default is all inputs of the stream. Who has written what was yielded lets the faults
+    complain.
     """
     items = read_raw(stream.inputs) if items is None else items
     outcomes = map_ordered(function, items, jobs=stream.jobs, scheduler=stream.scheduler)
-    progress, faults = Progress(name), Faults(name, stream.on_error)
+    progress = Progress(faults.stage)
     with closing(outcomes):
         for outcome in outcomes:
             if outcome.value is not None:
@@ -48,4 +48,3 @@ def each(
                 faults(outcome.error)
             progress.advance()
         progress.close()
-    faults.complain()

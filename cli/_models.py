@@ -18,7 +18,7 @@ from facade_tools.formats.exporting import model_files, placed
 from facade_tools.geometry.mesh import Scene
 
 from ._export import write_files
-from ._stream import file_name, is_folder, open_sink
+from ._stream import Faults, file_name, is_folder, new_file_name, open_sink
 
 MODELS = (".glb", ".obj")
 DATA = (".json", ".jsonl")
@@ -54,16 +54,22 @@ def wanted(output: str | None, tree: str | None) -> Wanted:
     return Wanted(data, not data, tree is not None)
 
 
-def write_models(results: Iterable[Made], output: str | None, tree: str | None) -> None:
-    """Write results as they come where the options say; a single model waits for all."""
+def write_models(
+    results: Iterable[Made], outputs: tuple[str | None, str | None], faults: Faults
+) -> None:
+    """Write results as they come, and their trees, to the outputs; a single model waits for all."""
+    output, tree = outputs
     seen: set[str] = set()
     with _opened(output) as write, _trees(tree) as write_tree:
         for made in results:
-            if made.id in seen:
-                raise InvalidInput(f"id {made.id!r} stands twice; expected unique ids")
-            seen.add(made.id)
-            write_tree(made)
-            write(made)
+            try:
+                if made.id in seen:
+                    raise InvalidInput(f"id {made.id!r} stands twice; expected unique ids")
+                seen.add(made.id)
+                write_tree(made)
+                write(made)
+            except InvalidInput as error:
+                faults(error)
 
 
 @contextmanager
@@ -86,7 +92,8 @@ def _opened(output: str | None) -> Iterator[Callable[[Made], None]]:
         yield kept.append
         _model(kept, Path(output))
     else:
-        yield lambda made: _alone(made, Path(output or ""))
+        names: dict[str, str] = {}
+        yield lambda made: _alone(made, Path(output or ""), names)
 
 
 def _bytes(artifact: Any, output: str | None) -> bytes:
@@ -95,9 +102,9 @@ def _bytes(artifact: Any, output: str | None) -> bytes:
     return dump_line(document) if lines else dump_document(document)
 
 
-def _alone(made: Made, folder: Path) -> None:
+def _alone(made: Made, folder: Path, names: dict[str, str]) -> None:
     assert made.scene is not None
-    write_files(folder, model_files([made.scene], file_name(made.id), "glb"))
+    write_files(folder, model_files([made.scene], new_file_name(made.id, names), "glb"))
 
 
 def _model(rows: list[Made], path: Path) -> None:

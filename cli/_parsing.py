@@ -224,7 +224,7 @@ def _check_outputs(paths: list[str], output: str | None, options: ParseOptions) 
     identities = [Path(path).stem for path in paths]
     named = [target for name in PICTURE_OPTIONS if (target := getattr(options, name))]
     folder = output if output not in (None, "-") and is_folder(str(output)) else None
-    seen: set[str] = set()
+    seen: dict[str, str] = {}
     for identity in identities if named or folder else ():
         new_file_name(identity, seen)
     written = [_target(name, identity, many) for name in named for identity in identities]

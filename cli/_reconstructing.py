@@ -22,7 +22,7 @@ from ._items import each
 from ._lots import Plot, plots
 from ._models import Made, Wanted, wanted, write_models
 from ._options import StreamOptions
-from ._stream import refuse_overwriting, side_input
+from ._stream import Faults, refuse_overwriting, side_input
 
 NAME = "reconstruct"
 
@@ -115,7 +115,9 @@ def run_reconstruct(stream: StreamOptions, values: Mapping[str, Any]) -> None:
     )
     grounds = None if footprint is None else list(plots(footprint, values["metres"]))
     tasks = _tasks(stream, grounds)
-    write_models(each(NAME, maker, stream, tasks), stream.output, tree)
+    faults = Faults(NAME, stream.on_error)
+    write_models(each(maker, stream, faults, tasks), (stream.output, tree), faults)
+    faults.complain()
 
 
 def _tasks(stream: StreamOptions, grounds: list[Plot] | None) -> Iterator[Any]:

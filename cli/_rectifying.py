@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import re
-import sys
 from pathlib import Path
 
 import click
@@ -18,7 +17,7 @@ from facade_tools.imaging.homography import Points
 from facade_tools.imaging.image_io import Photo, encoded, read_photo
 from facade_tools.imaging.rectify import Rectification, automatic, from_corners, from_report
 
-from ._stream import refuse_overwriting
+from ._stream import refuse_overwriting, to_stdout
 
 LOG = logging.getLogger("facade_tools.rectify")
 
@@ -41,7 +40,7 @@ def run_rectify(image: str, output: str | None, corners: str, report: str | None
     except InvalidInput as error:
         raise click.UsageError(str(error)) from None
     if output == "-":
-        sys.stdout.buffer.write(data)
+        to_stdout("", data)
     else:
         write_bytes(Path(output), data)
     if report is not None:

@@ -93,6 +93,13 @@ class Faults:
         say_error(self.stage, error)
         self.count += 1
 
+    def guard(self, write: Callable[[str, bytes], None], identity: str, data: bytes) -> None:
+        """Write an artifact; an id that cannot be written is a fault of its item."""
+        try:
+            write(identity, data)
+        except InvalidInput as error:
+            self(error)
+
     def complain(self) -> None:
         """Raise InvalidInput if anything was left out."""
         if self.count:
@@ -137,7 +144,7 @@ def write_items(
             if outcome.value is not None:
                 show_messages(outcome.value.messages)
                 for identity, data in outcome.value.artifacts:
-                    write(identity, data)
+                    faults.guard(write, identity, data)
             elif outcome.error is None:
                 continue
             else:
@@ -153,6 +160,7 @@ def _show_remote(traceback: str) -> None:
         click.echo(traceback, err=True)
 
 
+LONGEST_NAME = 200  # bytes; of 255 that file systems take, endings and marks need some
 Write = Callable[[str, bytes], None]
 
 
@@ -175,7 +183,7 @@ def one_by_one(output: str | None) -> bool:
 def open_sink(output: str | None, suffix: str = ".json") -> Iterator[Write]:
     """Open what takes the results: standard output, one file, or a folder with a file an item."""
     if output is None or output == "-":
-        yield _to_stdout
+        yield to_stdout
     elif is_folder(output):
         yield _to_folder(Path(output), suffix)
     else:
@@ -183,12 +191,15 @@ def open_sink(output: str | None, suffix: str = ".json") -> Iterator[Write]:
             yield _to_file(file, output)
 
 
-def _to_stdout(_: str, data: bytes) -> None:
+def to_stdout(_: str, data: bytes) -> None:
+    """Write bytes to standard output; raises ReaderLeft or OutputFailed."""
     try:
         sys.stdout.buffer.write(data)
         sys.stdout.buffer.flush()
     except BrokenPipeError:
         raise ReaderLeft from None
+    except OSError as error:
+        raise OutputFailed(f"standard output cannot be written: {error.strerror}") from error
 
 
 def _to_file(file: BinaryIO, output: str) -> Write:
@@ -205,7 +216,7 @@ def _to_file(file: BinaryIO, output: str) -> Write:
 
 
 def _to_folder(folder: Path, suffix: str) -> Write:
-    seen: set[str] = set()
+    seen: dict[str, str] = {}
 
     def write(identity: str, data: bytes) -> None:
         name = new_file_name(identity, seen) + suffix
@@ -221,15 +232,23 @@ def _to_folder(folder: Path, suffix: str) -> Write:
 def file_name(identity: str) -> str:
     """Return a file name for an item's id: what could leave the folder is replaced."""
     safe = "".join(c if c.isalnum() or c in "-_.+@" else "_" for c in identity)
-    return safe.lstrip(".") or "_"
+    short = safe.encode()[:LONGEST_NAME].decode(errors="ignore")
+    return short.lstrip(".") or "_"
 
 
-def new_file_name(identity: str, seen: set[str]) -> str:
-    """Return the file name of an item's id, added to those `seen`; raises InvalidInput on one."""
+def new_file_name(identity: str, seen: dict[str, str]) -> str:
+    """Return the file name of an item's id; raises InvalidInput where another one took it.
+
+    seen: ids by their file names so far, without case, which not every file system tells apart.
+    """
     name = file_name(identity)
-    if name in seen:
+    other = seen.setdefault(name.casefold(), "")
+    if other == identity:
         raise InvalidInput(f"id {identity!r} stands twice; expected unique ids in a folder")
-    seen.add(name)
+    if other:
+        text = f"ids {other!r} and {identity!r} have one file name, {name} (case does not count)"
+        raise InvalidInput(f"{text}; expected ids that differ in letters and digits")
+    seen[name.casefold()] = identity
     return name
 
 

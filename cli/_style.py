@@ -44,7 +44,7 @@ from facade_tools.stylization.style import Style
 from ._export import write_files
 from ._items import each
 from ._options import StreamOptions
-from ._stream import file_name, is_folder, new_file_name
+from ._stream import Faults, file_name, is_folder, new_file_name
 
 log = logging.getLogger("facade_tools.capture_style")
 
@@ -153,15 +153,21 @@ def run_retarget(
         sources = _single(sources, output)
     sheets = [_style(Path(folder)) for folder in styles]
     dresser = Dresser(sheets, sizes, small, stream.seed or 0)
-    seen: set[str] = set()
+    faults = Faults("retarget", stream.on_error)
+    seen: dict[str, str] = {}
     origin: Floats = np.zeros(3)
-    for identity, scene, step in each("retarget", dresser, stream, sources):
+    for identity, scene, step in each(dresser, stream, faults, sources):
+        try:
+            name = new_file_name(identity, seen)
+        except InvalidInput as error:
+            faults(error)
+            continue
         scene, origin = near_origin(scene, step, origin)
-        name = new_file_name(identity, seen)
         folder, stem = (
             (Path(output), name) if is_folder(output) else (Path(output).parent, Path(output).stem)
         )
         write_files(folder, model_files([scene], stem, form))
+    faults.complain()
 
 
 def _style(folder: Path) -> Style:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,8 @@ from facade_tools.segmentation.conventions import convention
 from facade_tools.segmentation.network_training import NetworkOptions
 from facade_tools.segmentation.patches import ForestOptions
 from facade_tools.segmentation.training import TrainOptions, load_start, read_pairs, train
+
+from ._stream import to_stdout
 
 COARSE = 288  # rows
 
@@ -42,6 +43,6 @@ def run_training(
     pairs = list(read_pairs(images, labels, convention(values["classes"])))
     data = save(train(pairs, options, rng=item_generator(seed, "train-parser")))
     if output == "-":
-        sys.stdout.buffer.write(data)
+        to_stdout("", data)
     else:
         write_bytes(Path(output), data)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
 from itertools import chain, islice
 from pathlib import Path
@@ -26,6 +25,7 @@ from facade_tools.imaging.render import Picture, render
 
 from ._items import each, load
 from ._options import StreamOptions
+from ._stream import Faults, to_stdout
 from .view import DRAWINGS, WITH_FILES
 
 MOST_PICTURES = 2000
@@ -91,14 +91,16 @@ def run_view(stream: StreamOptions, options: ViewOptions) -> None:
     if output is None:
         raise click.UsageError("Missing option '-o': name a .png or .html file.")
     ending = Path(output).suffix.lower()
+    faults = Faults("view", stream.on_error)
     if ending in (".html", ".htm"):
-        _emit(output, _page(stream, Path(output).stem))
+        _emit(output, _page(stream, Path(output).stem, faults))
     elif ending == ".svg":
         _emit(output, _vectors(stream))
     elif ending == ".png" or output == "-":
-        _emit(output, write_png(_sheet(stream, options)))
+        _emit(output, write_png(_sheet(stream, options, faults)))
     else:
         raise click.UsageError(f"{output}: unknown ending; expected .png, .html or .svg (layouts).")
+    faults.complain()
 
 
 def _vectors(stream: StreamOptions) -> bytes:
@@ -115,15 +117,15 @@ def _vectors(stream: StreamOptions) -> bytes:
 
 def _emit(output: str, data: bytes) -> None:
     if output == "-":
-        sys.stdout.buffer.write(data)
+        to_stdout("", data)
     else:
         write_bytes(Path(output), data)
 
 
-def _sheet(stream: StreamOptions, options: ViewOptions) -> Picture:
+def _sheet(stream: StreamOptions, options: ViewOptions, faults: Faults) -> Picture:
     pictures: list[Picture] = []
     labels: list[str] = []
-    for name, seen in _rendered(stream, options):
+    for name, seen in _rendered(stream, options, faults):
         pictures += seen
         labels += _labels(name, len(seen), options)
         if len(pictures) > MOST_PICTURES:
@@ -140,13 +142,13 @@ def _labels(name: str, count: int, options: ViewOptions) -> list[str]:
     return [*sides, "boxes", "mass energy"][:count] if count > 1 else [name]
 
 
-def _rendered(stream: StreamOptions, options: ViewOptions) -> Any:
+def _rendered(stream: StreamOptions, options: ViewOptions, faults: Faults) -> Any:
     """Yield id and pictures of each item; a single item gets the larger picture."""
     items = read_raw(stream.inputs)
     first = list(islice(items, 2))
     alone = len(first) == 1 and not (options.sides or options.mass)
     views = _views(options, options.size or (LARGE if alone else SMALL))
-    return each("view", Drawing(views, options.mass), stream, chain(first, items))
+    return each(Drawing(views, options.mass), stream, faults, chain(first, items))
 
 
 def _views(options: ViewOptions, size: tuple[int, int]) -> tuple[View, ...]:
@@ -154,10 +156,10 @@ def _views(options: ViewOptions, size: tuple[int, int]) -> tuple[View, ...]:
     return tuple(View(azimuth, options.elevation, size) for azimuth in azimuths)
 
 
-def _page(stream: StreamOptions, title: str) -> bytes:
+def _page(stream: StreamOptions, title: str, faults: Faults) -> bytes:
     exhibits: list[Exhibit] = []
     size = 0
-    for name, drawn in each("view", Drawing(), stream):
+    for name, drawn in each(Drawing(), stream, faults):
         if isinstance(drawn, Scene):
             exhibits.append(Exhibit(name, "model", write_glb([drawn], name)))
         else:

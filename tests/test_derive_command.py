@@ -74,6 +74,23 @@ def test_bad_footprints_are_skipped_and_jobs_change_nothing(facade_here, tmp_pat
     ids = [json.loads(line)["id"] for line in one.stdout.splitlines()]
     assert ids == ["one-0", "one-1", "two-0", "two-1"]
     assert b"skipped" in one.stderr
+    for name in ("some.jsonl", "some.glb"):  # what waits for all items holds the good ones
+        done = facade_here(*base, "--on-error", "skip", "-o", tmp_path / name)
+        assert (done.returncode, (tmp_path / name).exists()) == (3, True)
+    assert len((tmp_path / "some.jsonl").read_bytes().splitlines()) == 2
+
+
+def test_footprints_whose_ids_are_one_file_name_do_not_overwrite_one_another(facade_here, tmp_path):
+    ring = [[0, 0], [12, 0], [12, 9], [0, 9]]
+    rows = [
+        {"schema": "facade-tools/footprint/1", "id": name, "height": 9, "polygon": [ring]}
+        for name in ("way/1", "way:1")
+    ]
+    lots = tmp_path / "lots.jsonl"
+    lots.write_text("".join(json.dumps(row) + "\n" for row in rows))
+    done = facade_here("derive", "modern", "--footprint", lots, "-o", f"{tmp_path}/out/")
+    assert done.returncode == 3
+    assert b"have one file name" in done.stderr
 
 
 def test_several_buildings_do_not_go_into_one_json_file(facade_here, tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import subprocess
 
 import pytest
 import trimesh
@@ -192,6 +193,40 @@ def test_skip_writes_the_good_ones_and_exits_3(facade_here, tmp_path):
     )
     assert done.returncode == 3
     assert [path.name for path in out.iterdir()] == ["h1.glb"]
+
+
+@pytest.mark.parametrize("ending", ["glb", "obj", "city.json"])
+def test_skip_writes_the_good_ones_of_one_file(facade_here, tmp_path, ending):
+    bad = {**HOUSE, "id": "bad", "boxes": []}
+    skip = ("--on-error", "skip")
+    out, want = (tmp_path / name / f"model.{ending}" for name in ("skipped", "good"))
+    done = facade_here("export", "-", "-o", out, *skip, stdin=stream(bad, HOUSE, HOUSE))
+    assert done.returncode == 3
+    assert "2 bad items were skipped" in done.stderr.decode()
+    facade_here("export", "-", "-o", want, stdin=stream(HOUSE))
+    assert out.read_bytes() == want.read_bytes()
+
+
+def test_ids_that_would_share_a_file_are_told_apart_or_refused(facade_here, tmp_path):
+    long = "屋" * 200
+    names = ["way/1", "way:1", "A", "a", long, f"{long[:-1]}b"]
+    items = stream(*({**HOUSE, "id": name} for name in names))
+    done = facade_here("export", "-", "-o", f"{tmp_path}/o/", "--on-error", "skip", stdin=items)
+    assert done.returncode == 3
+    assert "ids 'way/1' and 'way:1' have one file name, way_1" in done.stderr.decode()
+    assert "ids 'A' and 'a' have one file name" in done.stderr.decode()
+    written = sorted(path.name for path in (tmp_path / "o").iterdir())
+    assert written == ["A.glb", "way_1.glb", f"{'屋' * 66}.glb"]
+
+
+def test_standard_output_that_is_full_is_no_bug(facade_script):
+    command = [facade_script, "export", "-", "-o", "-"]
+    with open("/dev/full", "wb") as full:
+        done = subprocess.run(
+            command, input=stream(HOUSE), stdout=full, stderr=subprocess.PIPE, check=False
+        )
+    assert done.returncode == 1
+    assert b"export: error: standard output cannot be written: No space left" in done.stderr
 
 
 def test_an_empty_stream_is_an_empty_model(facade_here, tmp_path):

@@ -50,7 +50,7 @@ def test_ids_that_are_one_file_name_are_refused(facade_here, sheet, tmp_path):
     bases = [base_file(tmp_path / f"{k}.json", name) for k, name in enumerate(["a/b", "a_b"])]
     done = facade_here("retarget", sheet, *bases, "-o", tmp_path / "out")
     assert done.returncode == 3
-    assert "id 'a_b' stands twice" in done.stderr.decode()
+    assert "ids 'a/b' and 'a_b' have one file name, a_b" in done.stderr.decode()
 
 
 def test_meshes_of_one_folder_are_named_by_their_files(facade_here, sheet, tmp_path):

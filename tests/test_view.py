@@ -231,6 +231,16 @@ def test_wrong_usage(facade_here, tmp_path, arguments, code):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("name", ["sheet.png", "page.html"])
+def test_skip_draws_the_good_ones(facade_here, tmp_path, name):
+    items = stream({**HOUSE, "id": "bad", "boxes": []}, FOOTPRINT)
+    out = tmp_path / name
+    words = ("view", "-", "-o", out, "--on-error", "skip")
+    done = facade_here(*words, stdin=items)
+    assert (done.returncode, out.exists()) == (3, True)
+    assert b"1 bad items were skipped" in done.stderr
+
+
 def test_every_drawing_in_the_table_exists():
     from facade_tools.artifacts.documents import KINDS
     from facade_tools.cli._items import load

@@ -55,8 +55,19 @@ def inputs(metavar: str, required: bool = True) -> Callable[[F], F]:
     return click.argument("inputs", nargs=-1, required=required, metavar=metavar)
 
 
+def _named(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
+    """Refuse the path of a shell variable that is not set: it would mean the current folder."""
+    if value == "":
+        raise click.BadParameter("is empty; name a file or a folder", ctx, param)
+    return value
+
+
 output = click.option(
-    "-o", "--output", metavar="PATH", help="Where to write; standard output without it."
+    "-o",
+    "--output",
+    metavar="PATH",
+    callback=_named,
+    help="Where to write; standard output without it.",
 )
 seed = click.option(
     "--seed",

@@ -170,8 +170,14 @@ def is_single(output: str | None) -> bool:
 
 
 def is_folder(output: str) -> bool:
-    """Tell whether an output path means a folder: it is one, ends in a slash, or has no suffix."""
-    return output.endswith("/") or Path(output).is_dir() or not Path(output).suffix
+    """Tell whether an output path means a folder: it is one, ends in a slash, or has no suffix.
+
+    Devices and pipes (`/dev/null`, `/dev/fd/63`) are none.
+    """
+    path = Path(output)
+    if output.endswith("/") or path.is_dir():
+        return True
+    return not path.suffix and (path.is_file() or not path.exists())
 
 
 def one_by_one(output: str | None) -> bool:

@@ -8,6 +8,8 @@ from contextlib import closing
 from importlib import import_module
 from typing import Any, NamedTuple
 
+import click
+
 from facade_tools.artifacts.documents import KINDS, decode, kind_of
 from facade_tools.artifacts.store import RawItem, read_raw
 from facade_tools.errors import InvalidInput
@@ -15,7 +17,7 @@ from facade_tools.parallel import map_ordered
 
 from ._options import StreamOptions
 from ._report import Progress
-from ._stream import open_sink
+from ._stream import is_single, open_sink, refuse_overwriting
 
 # Kind of artifact -> function that yields its problems.
 RULES = {
@@ -46,6 +48,10 @@ class Finding(NamedTuple):
 
 def run_validation(stream: StreamOptions, form: str) -> None:
     """Check all inputs and write the findings; raises InvalidInput if there is any."""
+    refuse_overwriting(stream.inputs, [stream.output])
+    if is_single(stream.output):
+        text = f"{stream.output}: findings are one a line; name a .txt or .jsonl file"
+        raise click.UsageError(text)
     items = read_raw(stream.inputs)
     outcomes = map_ordered(findings, items, jobs=stream.jobs, scheduler=stream.scheduler)
     progress = Progress("validate")
@@ -73,7 +79,7 @@ def findings(item: RawItem) -> list[Finding]:
     """Return all that is wrong with one item."""
     identity = ""
     try:
-        document = item.document()
+        document = item.document(unique=True)
         identity = str(document.get("id", "")) if isinstance(document, dict) else ""
         kind = kind_of(document, tuple(KINDS))
         artifact = decode(document, kind)

@@ -179,7 +179,7 @@ def test_one_json_file_holds_one_artifact(facade, tmp_path):
 
 @pytest.mark.parametrize(("stage", "name"), [
     ("export", "a.city.json"), ("import", "a.city.json"), ("import", "./b/../a.city.json"),
-    ("reconstruct", "a.json"),
+    ("reconstruct", "a.json"), ("validate", "a.jsonl"),
 ])  # fmt: skip
 def test_results_of_another_kind_do_not_overwrite_their_input(facade_here, tmp_path, stage, name):
     (tmp_path / "b").mkdir()
@@ -189,6 +189,43 @@ def test_results_of_another_kind_do_not_overwrite_their_input(facade_here, tmp_p
     assert done.returncode == 2, done.stderr
     assert b"is an input and would be overwritten" in done.stderr
     assert path.read_text() == "{}"
+
+
+def test_devices_are_no_folders_and_no_path_is_no_folder_either(facade_here, tmp_path):
+    done = facade_here("attributes", BUNGALOWS, "-o", "/dev/null", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, b"")
+    full = facade_here("attributes", BUNGALOWS, "-o", "/dev/full", cwd=tmp_path)
+    assert full.returncode == 1
+    assert b"/dev/full: cannot be written: No space left on device" in full.stderr
+    unset = facade_here("attributes", BUNGALOWS, "-o", "", cwd=tmp_path)
+    assert unset.returncode == 2
+    assert b"is empty; name a file or a folder" in unset.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_file_in_the_place_of_a_folder_is_no_bug(facade_here, tmp_path):
+    (tmp_path / "file").touch()
+    done = facade_here("attributes", BUNGALOWS, "-o", "file/x.jsonl", cwd=tmp_path)
+    assert done.returncode == 1
+    assert b"file/x.jsonl: cannot be written: Not a directory" in done.stderr
+
+
+def test_validate_finds_keys_that_stand_twice(facade_here, tmp_path):
+    house = BUNGALOWS.read_text().splitlines()[0]
+    (tmp_path / "a.jsonl").write_text(house.replace('"boxes":', '"boxes":[],"boxes":', 1) + "\n")
+    done = facade_here("validate", "a.jsonl", "--format", "json", cwd=tmp_path)
+    assert done.returncode == 3
+    (finding,) = lines(done.stdout)
+    assert (finding["line"], finding["message"]) == (
+        1,
+        "key 'boxes' stands twice; expected it once",
+    )
+
+
+def test_findings_are_no_single_json_document(facade_here, tmp_path):
+    done = facade_here("validate", BUNGALOWS, "-o", "x.json", cwd=tmp_path)
+    assert done.returncode == 2
+    assert b"name a .txt or .jsonl file" in done.stderr
 
 
 def test_a_stage_from_json_to_json_may_replace_its_input(facade_here, tmp_path):

@@ -41,11 +41,20 @@ class Artifact(Protocol):
     kind: ClassVar[str]
 
 
-def parse_json(data: bytes) -> Any:
-    """Return the JSON value of `data` (UTF-8). Raises InvalidInput with the line of an error."""
+def parse_json(data: bytes, unique: bool = False) -> Any:
+    """Return the JSON value of `data` (UTF-8). Raises InvalidInput with the line of an error.
+
+    unique: refuse a key that stands twice, of which the last one counts otherwise (a tenth slower).
+    """
+    pairs = _refuse_doubled if unique else None
     try:
         text = data.decode("utf-8-sig")
-        return json.loads(text, parse_float=parse_float, parse_constant=_refuse_constant)
+        return json.loads(
+            text,
+            parse_float=parse_float,
+            parse_constant=_refuse_constant,
+            object_pairs_hook=pairs,
+        )
     except json.JSONDecodeError as error:
         line = error.lineno if text.count("\n") > 1 else None
         at = f"column {error.colno}"
@@ -56,6 +65,15 @@ def parse_json(data: bytes) -> Any:
         raise InvalidInput("nested too deeply; expected an artifact") from None
     except ValueError as error:
         raise InvalidInput(f"not valid JSON: {error}") from None
+
+
+def _refuse_doubled(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise InvalidInput(f"key {twice!r} stands twice; expected it once")
+    return found
 
 
 def _refuse_constant(name: str) -> float:

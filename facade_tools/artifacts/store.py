@@ -27,11 +27,14 @@ class RawItem:
     data: bytes
     yaml: bool = False
 
-    def document(self, implied: str | None = None) -> Any:
-        """Parse to plain data; `implied` is the kind of hand-written YAML without a schema."""
+    def document(self, implied: str | None = None, unique: bool = False) -> Any:
+        """Parse to plain data; `implied` is the kind of hand-written YAML without a schema.
+
+        unique: also refuse JSON in which a key stands twice, as YAML always is.
+        """
         try:
             if not self.yaml:
-                return parse_json(self.data)
+                return parse_json(self.data, unique)
             document = parse_yaml(self.data)
             check_finite(document)
         except InvalidInput as error:

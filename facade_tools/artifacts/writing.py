@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
@@ -34,7 +34,8 @@ def atomic_file(path: Path) -> Iterator[BinaryIO]:
         with _explained(path):
             os.replace(beside, path)
     finally:
-        beside.unlink(missing_ok=True)
+        with suppress(OSError):  # what stood in the way of writing, stands in the way of this
+            beside.unlink(missing_ok=True)
 
 
 @contextmanager

@@ -9,7 +9,7 @@ import numpy as np
 from samples_draw import Draw, Dress
 
 from facade_tools.artifacts.building import Building, Element, Facade, Piece, Side
-from facade_tools.geometry.blocked import blocked_rectangles
+from facade_tools.geometry.blocked import blocked_walls
 from facade_tools.geometry.pieces import facade_pieces
 
 EDGE = 0.2  # least wall between an element and the border of its piece (m)
@@ -60,9 +60,11 @@ def _hits(e: Element, row: list[float] | tuple[float, ...]) -> bool:
 
 def dressed(building: Building, dress: Dress, d: Draw) -> dict[Side, Facade]:
     """Return the facades of a house."""
+    walls = facade_pieces(building)
+    blocked = blocked_walls(building, walls)
     spots = [
-        _spot(building, side, piece)
-        for side, pieces in facade_pieces(building).items()
+        _spot(building, side, piece, blocked[piece.id])
+        for side, pieces in walls.items()
         for piece in pieces
     ]
     kinds = {box.id: box.kind for box in building.boxes}
@@ -88,10 +90,10 @@ def _facade(spots: list[Spot], side: Side) -> Facade:
     return Facade(tuple(pieces))
 
 
-def _spot(building: Building, side: Side, piece: Piece) -> Spot:
+def _spot(building: Building, side: Side, piece: Piece, blocked: np.ndarray) -> Spot:
     storey = int((piece.origin[2] + 1e-6) // building.storey_height)
     base = storey * building.storey_height - piece.origin[2]
-    return Spot(side, piece, storey, base, blocked_rectangles(building, side, piece), [])
+    return Spot(side, piece, storey, base, blocked, [])
 
 
 def _place_garage_doors(spots: list[Spot], dress: Dress, d: Draw) -> None:

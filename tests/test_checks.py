@@ -20,7 +20,7 @@ from facade_tools.artifacts.building import (
     Side,
 )
 from facade_tools.artifacts.store import read
-from facade_tools.geometry.blocked import blocked_rectangles, porch_posts, roof_height
+from facade_tools.geometry.blocked import BuiltRoof, blocked_rectangles, porch_posts, roof_height
 from facade_tools.geometry.checks import Problem, building_problems
 from facade_tools.geometry.pieces import facade_pieces
 
@@ -203,9 +203,11 @@ def test_window_where_a_lower_roof_runs_into_the_wall_is_found(name: str) -> Non
 def test_no_roof_stands_before_a_wall_beside_the_lower_box() -> None:
     mass, side, _ = RISING["hip that runs on into the wall"]
     free = [p for p in facade_pieces(mass)["left"] if p.box == "main" and p.origin[2] == 3.0]
-    assert blocked_rectangles(mass, "left", free[0])[:, 3].max() < 0.06  # the eaves' overhang
+    assert (
+        blocked_rectangles(mass, BuiltRoof.of(mass), "left", free[0])[:, 3].max() < 0.06
+    )  # the eaves' overhang
     buried = next(p for p in facade_pieces(mass)[side] if p.origin[2] == 3.0)
-    ridge = blocked_rectangles(mass, side, buried)[:, 3].max()
+    ridge = blocked_rectangles(mass, BuiltRoof.of(mass), side, buried)[:, 3].max()
     assert ridge == pytest.approx(3.0 * math.tan(math.radians(30)) + 0.2, abs=0.02)
 
 
@@ -255,4 +257,4 @@ def test_upper_wall_is_not_blocked_by_the_porch_below() -> None:
     building = house(porch)
     upper = building.facades["front"].pieces[-1]
     assert upper.origin[2] == 3
-    assert len(blocked_rectangles(building, "front", upper)) == 0
+    assert len(blocked_rectangles(building, BuiltRoof.of(building), "front", upper)) == 0

@@ -9,7 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..artifacts.building import Building, Element, Piece, Side
-from ..geometry.blocked import blocked_rectangles, wall_of
+from ..geometry.arrays import Rectangles
+from ..geometry.blocked import wall_of
 from ..geometry.checks import element_rectangles, overlaps
 
 log = logging.getLogger("facade_tools.facadegen")
@@ -23,9 +24,10 @@ Spot = tuple[float, float, Piece]  # a piece and where it begins in the frame of
 def designed_pieces(
     building: Building,
     pieces: Mapping[Side, Sequence[Piece]],
+    blocked: Mapping[str, Rectangles],
     designers: Mapping[Side, Designer],
 ) -> dict[str, tuple[Element, ...]]:
-    """Return by piece id the elements of designed walls.
+    """Return by piece id the elements of designed walls; blocked: where none may be, likewise.
 
     A design is solved for the largest plane of general boxes of its side, all storeys together.
     Its elements count as known: a design is the user's word. Elements that would cross a storey
@@ -43,8 +45,8 @@ def designed_pieces(
         lost = len(elements)
         for u, v, piece in spots:
             inside = _inside(elements, (u, v), piece)
-            blocked = blocked_rectangles(building, side, piece)
-            hits = np.asarray(overlaps(element_rectangles(inside), blocked).any(axis=1))
+            rows = overlaps(element_rectangles(inside), blocked[piece.id])
+            hits = np.asarray(rows.any(axis=1))
             found[piece.id] = tuple(e for e, hit in zip(inside, hits, strict=True) if not hit)
             lost -= len(found[piece.id])
         if lost:

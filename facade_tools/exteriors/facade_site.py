@@ -9,8 +9,7 @@ import numpy as np
 
 from ..artifacts.building import SIDES, Building, Element, Facade, Piece
 from ..artifacts.building import Side as SideName
-from ..geometry.arrays import Floats, Integers
-from ..geometry.blocked import blocked_rectangles
+from ..geometry.arrays import Floats, Integers, Rectangles
 from .facade_attributes import pack_facades, stacked
 from .facade_energy import least_energy
 from .facade_layout import (
@@ -68,17 +67,19 @@ def search_side_of(
     rows: Sequence[PartRow],
     codes: Codes,
     heads: Mapping[int, float],
+    walls: Mapping[str, Rectangles],
 ) -> Side:
-    """Return the arrays of one side, without main door and targets."""
+    """Return the arrays of one side, without main door and targets.
+
+    walls: by piece id, where no element may be.
+    """
     packed = pack_facades({standing.name: Facade(standing.pieces)})
     fixed = packed.elements.copy()
     elements = (e for piece in standing.pieces for e in piece.elements)
     for k, e in enumerate(elements):
         fixed[k, 0] = codes.number(e.kind, e.style)
     blocked = [
-        (p, *row)
-        for p, piece in enumerate(standing.pieces)
-        for row in blocked_rectangles(building, standing.name, piece).tolist()
+        (p, *row) for p, piece in enumerate(standing.pieces) for row in walls[piece.id].tolist()
     ]
     pieces = packed.pieces
     pairs = [

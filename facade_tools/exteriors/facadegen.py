@@ -11,7 +11,8 @@ from ..artifacts.attributes import WINDOW_BITS, Attributes, FacadeAttributes
 from ..artifacts.building import SIDES, Building, Element, Energy, Facade, Piece, Side
 from ..artifacts.library import LibraryBuilding
 from ..errors import InvalidInput
-from ..geometry.arrays import Floats
+from ..geometry.arrays import Floats, Rectangles
+from ..geometry.blocked import blocked_walls
 from ..geometry.pieces import facade_pieces
 from .attributes import building_attributes
 from .designed import Designer, designed_pieces
@@ -65,7 +66,9 @@ def generate_facades(
     """
     _refuse_unfinished(building)
     shelf = options.library or default_library()
-    designed = designed_pieces(building, facade_pieces(building), options.designs)
+    pieces = facade_pieces(building)
+    blocked = blocked_walls(building, pieces)
+    designed = designed_pieces(building, pieces, blocked, options.designs)
     among = max(SIMILAR, options.candidates)
     for number, own in enumerate(rng.spawn(options.candidates), start=1):
         identity = building.id if options.candidates == 1 else f"{building.id}-{number}"
@@ -73,7 +76,8 @@ def generate_facades(
         wanted = _wanted(building, similar[0])
         if options.keep is not None:
             similar = [shelf.observed(entry, options.keep) for entry in similar]
-        tries = (_Attempt(building, shelf, entry, options, own, designed) for entry in similar)
+        walls = _Walls(pieces, blocked, designed)
+        tries = (_Attempt(building, walls, shelf, entry, options, own) for entry in similar)
         yield replace(_first_good(attempt.finished(wanted) for attempt in tries), id=identity)
 
 
@@ -118,15 +122,24 @@ def _wanted(building: Building, entry: LibraryBuilding) -> FacadeAttributes:
 
 
 @dataclass(frozen=True, slots=True)
+class _Walls:
+    """The pieces of a building by side; by their ids, where no element may be, and its design."""
+
+    pieces: Mapping[Side, Sequence[Piece]]
+    blocked: Mapping[str, Rectangles]
+    designed: Mapping[str, tuple[Element, ...]]
+
+
+@dataclass(frozen=True, slots=True)
 class _Attempt:
     """One candidate in the making: the building, its elements' source, its random numbers."""
 
     building: Building
+    walls: _Walls
     shelf: ElementLibrary
     entry: LibraryBuilding
     options: FacadeOptions
     rng: np.random.Generator
-    designed: Mapping[str, tuple[Element, ...]]
 
     def finished(self, wanted: FacadeAttributes) -> tuple[Building, float]:
         """Return the building with facades, colours and energy, and the energy over its bound."""
@@ -144,7 +157,7 @@ class _Attempt:
         facades: dict[Side, Facade] = {}
         excess = 0.0
         for standing, targets in zip(sides, side_targets(wanted), strict=True):
-            plain = search_side_of(self.building, standing, rows, codes, heads)
+            plain = search_side_of(self.building, standing, rows, codes, heads, self.walls.blocked)
             doors = self._main_doors(sides, standing, plain, rows)
             found, main = self._best(plain, doors, targets)
             facades[standing.name] = facade_of(standing, plain, found, codes, main)
@@ -154,9 +167,9 @@ class _Attempt:
     def _standing(self, wanted: FacadeAttributes) -> list[Standing]:
         """Return the sides with known elements and garage doors."""
         keep, library = self.options.keep, self.shelf.library
-        made = facade_pieces(self.building)
+        made, blocked = self.walls.pieces, self.walls.blocked
         sides = [
-            _with_elements(side, self.designed)
+            _with_elements(side, self.walls.designed)
             for side in standing_sides(self.building, made, keep)
         ]
         free = {side.name: side.pieces for side in sides if not side.closed}
@@ -164,7 +177,8 @@ class _Attempt:
             name: _area(pieces, ratio) - (name == "front") * MAIN_DOOR_AREA
             for (name, pieces), ratio in zip(made.items(), wanted.wwr, strict=True)
         }
-        doors = garage_doors(self.building, free, garage_sizes(library, self.entry), room)
+        sizes = garage_sizes(library, self.entry)
+        doors = garage_doors(self.building, free, blocked, sizes, room)
         return [_with_elements(side, doors) for side in sides]
 
     def _main_doors(

@@ -6,8 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from ..artifacts.building import SIDES, Building, Element, Piece, Side
 from ..artifacts.library import Library, LibraryBuilding
-from ..geometry.arrays import Floats
-from ..geometry.blocked import blocked_rectangles
+from ..geometry.arrays import Floats, Rectangles
 from ..geometry.checks import GARAGE_WALL, element_rectangles, overlaps
 
 Size = tuple[str, float, float]  # style, width, height (m)
@@ -19,19 +18,20 @@ BETWEEN = 0.3  # least wall between two (m)
 def garage_doors(
     building: Building,
     pieces: Mapping[Side, Sequence[Piece]],
+    blocked: Mapping[str, Rectangles],
     sizes: Sequence[Size],
     room: Mapping[Side, float],
 ) -> dict[str, tuple[Element, ...]]:
     """Return by piece id the doors of every garage: in its front wall, or else its widest.
 
-    sizes: as `garage_sizes` gives them. room: how much area the target ratio of a side leaves
-    for garage doors (m²); the smallest door is placed even where that is too little.
+    blocked: by piece id, where none may be. sizes: as `garage_sizes` gives them. room: how much
+    area the target ratio of a side leaves for garage doors (m²); the smallest door is placed even
+    where that is too little.
     """
     doors: dict[str, tuple[Element, ...]] = {}
     for box in building.boxes:
         for side, piece in _walls(box.id, pieces) if box.kind == "garage" else ():
-            blocked = blocked_rectangles(building, side, piece)
-            placed = _widest(list(_rows(piece, sizes, blocked)), room[side])
+            placed = _widest(list(_rows(piece, sizes, blocked[piece.id])), room[side])
             if placed:
                 doors[piece.id] = placed
                 break

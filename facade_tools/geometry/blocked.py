@@ -5,9 +5,8 @@ All rectangles lie in a facade piece's frame: u to the right as seen from outsid
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 import shapely
@@ -55,16 +54,53 @@ def wall_of(side: Side, piece: Piece) -> Wall:
     return Wall((piece.origin[0], piece.origin[1]), along, outwards)
 
 
-def blocked_rectangles(building: Building, side: Side, piece: Piece) -> Rectangles:
+@dataclass(frozen=True, slots=True)
+class BuiltRoof:
+    """The planes of the roof of a mass, z = a·x + b·y + c, and what each lies over, prepared."""
+
+    shapes: tuple[shapely.Polygon, ...]
+    planes: tuple[Plane, ...]
+
+    @classmethod
+    def of(cls, building: Building) -> BuiltRoof:
+        """Return the roof over the general and garage boxes of a building."""
+        patches = union_patches(mass_boxes(building))
+        shapes = [shape_of(patch.rings) for patch in patches]
+        shapely.prepare(shapes)
+        return cls(tuple(shapes), tuple(patch.plane for patch in patches))
+
+    def heights(self, points: Points2) -> Floats:
+        """Return the height (m) over plan points (n, 2); −inf beside the mass."""
+        heights = np.full(len(points), -np.inf)
+        for shape, (a, b, c) in zip(self.shapes, self.planes, strict=True):
+            over = shapely.intersects_xy(shape, points[:, 0], points[:, 1])
+            np.maximum(heights, points @ np.array([a, b]) + c, out=heights, where=over)
+        return heights
+
+
+def blocked_walls(
+    building: Building, pieces: Mapping[Side, Iterable[Piece]]
+) -> dict[str, Rectangles]:
+    """Return by piece id the parts of all walls where no element may be: `blocked_rectangles`."""
+    roof = BuiltRoof.of(building)
+    return {
+        piece.id: blocked_rectangles(building, roof, side, piece)
+        for side, row in pieces.items()
+        for piece in row
+    }
+
+
+def blocked_rectangles(building: Building, roof: BuiltRoof, side: Side, piece: Piece) -> Rectangles:
     """Return the parts (n, 4) of a piece where no element may be: u0, v0, u1, v1, metres.
 
     Roofs of other boxes that meet the wall (a sloping line as strips), porch roofs, and the wall
-    right behind a porch post. A roof that runs on into the wall's box counts as it is built.
-    Rectangles may stick out of the piece, and overlap.
+    right behind a porch post. A roof that runs on into the wall's box counts as it is built:
+    `roof` is that of the building, made once for all its walls. Rectangles may stick out of the
+    piece, and overlap.
     """
     wall = wall_of(side, piece)
     rows = [row for box in building.boxes for row in _roof_strips(box, wall, piece)]
-    rows += _buried_strips(mass_boxes(building), wall, piece, rows)
+    rows += _buried_strips(roof, wall, piece, rows)
     porches = [box for box in building.boxes if box.kind == "porch"]
     rows += [row for porch in porches for row in _post_strips(building, porch, wall, piece)]
     return np.array(rows, dtype=np.float64).reshape(-1, 4)
@@ -137,7 +173,7 @@ def _roof_strips(box: Box, wall: Wall, piece: Piece) -> Iterator[tuple[float, ..
 
 
 def _buried_strips(
-    boxes: Sequence[Box], wall: Wall, piece: Piece, known: Sequence[tuple[float, ...]]
+    roof: BuiltRoof, wall: Wall, piece: Piece, known: Sequence[tuple[float, ...]]
 ) -> Iterator[tuple[float, ...]]:
     """Yield strips of a piece, from its bottom, that lie inside the roofs of the mass.
 
@@ -150,32 +186,13 @@ def _buried_strips(
     cuts = np.stack([edges[:-1] + beside, (edges[:-1] + edges[1:]) / 2, edges[1:] - beside], 1)
     at = np.array(wall.start) + OUTSIDE * np.array(wall.outwards)
     points = at + cuts.reshape(-1, 1) * np.array(wall.along)
-    highs = built_height(tuple(boxes), points).reshape(-1, 3).max(axis=1) - piece.origin[2]
+    highs = roof.heights(points).reshape(-1, 3).max(axis=1) - piece.origin[2]
     for left, right, high in zip(edges[:-1], edges[1:], highs.tolist(), strict=True):
         if high > NEAR and not any(
             u0 <= left + NEAR and right <= u1 + NEAR and v0 <= 0.0 and v1 >= high + OVER - BESIDE
             for u0, v0, u1, v1 in known
         ):
             yield left, -UNDER, right, high + SLAB + OVER
-
-
-def built_height(boxes: tuple[Box, ...], points: Points2) -> Floats:
-    """Return the height (m) of the mass with its roofs over plan points (n, 2); −inf beside it."""
-    shapes, planes = _built_roof(boxes)
-    heights = np.full(len(points), -np.inf)
-    for shape, (a, b, c) in zip(shapes, planes, strict=True):
-        over = shapely.intersects_xy(shape, points[:, 0], points[:, 1])
-        np.maximum(heights, points @ np.array([a, b]) + c, out=heights, where=over)
-    return heights
-
-
-@lru_cache(maxsize=4)
-def _built_roof(boxes: tuple[Box, ...]) -> tuple[list[shapely.Polygon], list[Plane]]:
-    """Return the roof's planes and what they lie over: asked for once a piece, made once."""
-    patches = union_patches(boxes)
-    shapes = [shape_of(patch.rings) for patch in patches]
-    shapely.prepare(shapes)
-    return shapes, [patch.plane for patch in patches]
 
 
 def _line_meets(box: Box, wall: Wall, piece: Piece) -> bool:

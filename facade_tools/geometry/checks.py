@@ -15,7 +15,7 @@ import numpy as np
 
 from ..artifacts.building import SIDES, Building, Element, Piece, Side
 from .arrays import Booleans, Rectangles
-from .blocked import blocked_rectangles
+from .blocked import BuiltRoof, blocked_rectangles
 from .floors import TOLERANCE
 from .pieces import facade_pieces
 
@@ -54,12 +54,15 @@ def building_problems(building: Building) -> Iterator[Problem]:
     walls_known = not building.partial or "mass" in building.complete
     if walls_known and all(box.height for box in building.boxes if box.kind != "porch"):
         yield from _piece_problems(building)
+    if not building.facades:
+        return
+    roof = BuiltRoof.of(building)
     placed = list(_placed(building))
-    yield from _placing_problems(building, placed)
+    yield from _placing_problems(building, roof, placed)
     if building.energy is not None and building.energy.facade is not None:
         yield from _head_problems(building, placed)
     if not building.partial:
-        yield from _door_problems(building, placed)
+        yield from _door_problems(building, roof, placed)
 
 
 def _box_problems(building: Building) -> Iterator[Problem]:
@@ -141,7 +144,9 @@ def _placed(building: Building) -> Iterator[_Placed]:
                     yield _Placed(side, piece, element, pointer)
 
 
-def _placing_problems(building: Building, placed: list[_Placed]) -> Iterator[Problem]:
+def _placing_problems(
+    building: Building, roof: BuiltRoof, placed: list[_Placed]
+) -> Iterator[Problem]:
     groups: dict[tuple[Side, str], list[_Placed]] = {}
     for item in placed:
         groups.setdefault((item.side, item.pointer.rsplit("/", 1)[0]), []).append(item)
@@ -150,7 +155,7 @@ def _placing_problems(building: Building, placed: list[_Placed]) -> Iterator[Pro
         yield from _overlap_problems(items)
         fresh = [item for item in items if not item.element.known]
         if fresh:
-            blocked = blocked_rectangles(building, side, fresh[0].piece)
+            blocked = blocked_rectangles(building, roof, side, fresh[0].piece)
             yield from _blocked_problems(fresh, blocked)
             yield from _height_problems(fresh, building.storey_height)
 
@@ -227,7 +232,7 @@ def _head_problems(building: Building, placed: list[_Placed]) -> Iterator[Proble
             yield Problem(item.pointer, message)
 
 
-def _door_problems(building: Building, placed: list[_Placed]) -> Iterator[Problem]:
+def _door_problems(building: Building, roof: BuiltRoof, placed: list[_Placed]) -> Iterator[Problem]:
     mains = [item for item in placed if item.element.main]
     if "front" in building.facades:
         if len(mains) != 1:
@@ -235,7 +240,7 @@ def _door_problems(building: Building, placed: list[_Placed]) -> Iterator[Proble
         for item in mains:
             if not item.element.known and not _is_entrance(item):
                 yield Problem(item.pointer, "the main door is no door at ground level in the front")
-    yield from _garage_problems(building, placed)
+    yield from _garage_problems(building, roof, placed)
 
 
 def _is_entrance(item: _Placed) -> bool:
@@ -243,7 +248,9 @@ def _is_entrance(item: _Placed) -> bool:
     return item.element.kind == "door" and item.side == "front" and ground
 
 
-def _garage_problems(building: Building, placed: list[_Placed]) -> Iterator[Problem]:
+def _garage_problems(
+    building: Building, roof: BuiltRoof, placed: list[_Placed]
+) -> Iterator[Problem]:
     garages = {box.id for box in building.boxes if box.kind == "garage"}
     doors = [item for item in placed if item.element.kind == "garage-door"]
     for item in doors:
@@ -252,20 +259,20 @@ def _garage_problems(building: Building, placed: list[_Placed]) -> Iterator[Prob
     if len(building.facades) == len(SIDES):
         have = Counter(item.piece.box for item in doors)
         for i, box in enumerate(building.boxes):
-            if box.id in garages and not have[box.id] and _has_garage_wall(building, box.id):
+            if box.id in garages and not have[box.id] and _has_garage_wall(building, roof, box.id):
                 yield Problem(f"/boxes/{i}", "a garage with an exposed wall but no garage door")
 
 
-def _has_garage_wall(building: Building, box: str) -> bool:
+def _has_garage_wall(building: Building, roof: BuiltRoof, box: str) -> bool:
     return any(
-        piece.box == box and piece.origin[2] < NEAR and takes_garage_door(building, side, piece)
+        piece.box == box and piece.origin[2] < NEAR and _takes_door(building, roof, side, piece)
         for side, facade in building.facades.items()
         for piece in facade.pieces
     )
 
 
-def takes_garage_door(building: Building, side: Side, piece: Piece) -> bool:
+def _takes_door(building: Building, roof: BuiltRoof, side: Side, piece: Piece) -> bool:
     """Tell whether a ground piece is large and free enough that its garage needs a door."""
     if piece.width < GARAGE_WALL[0] or piece.height < GARAGE_WALL[1]:
         return False
-    return not (blocked_rectangles(building, side, piece)[:, 1] < GARAGE_WALL[1]).any()
+    return not (blocked_rectangles(building, roof, side, piece)[:, 1] < GARAGE_WALL[1]).any()

@@ -23,7 +23,7 @@ FORMATS = {"glb": ".glb", "obj": ".obj", "cityjson": ".city.json"}
     default="auto",
     show_default=True,
     help="Where items stand: auto puts imported ones back on their map, and others side by side "
-    "if their plans overlap.",
+    "if they stand on one another.",
 )
 def command(stream: StreamOptions, form: str | None, arrange: str) -> None:
     """Write buildings, footprints and layouts as GLB, OBJ or CityJSON.

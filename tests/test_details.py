@@ -352,6 +352,15 @@ def test_models_apart_keep_their_place_and_others_go_side_by_side():
     assert shifts([]).shape == (0, 3)
 
 
+def test_a_town_in_which_some_bounds_overlap_stays_where_it_is() -> None:
+    one = np.array([[0.0, 0.0, 0.0], [10.0, 8.0, 6.0]])
+    terrace = [one + np.array([9.0 * k, 5.0 * k, 0.0]) for k in range(6)]  # askew: bounds meet
+    assert not shifts(terrace).any()
+    row = [one + np.array([20.0 * k, 0.0, 0.0]) for k in range(6)]
+    assert not shifts([*row, one]).any()  # one house twice
+    assert shifts([*row, *row]).any()
+
+
 def test_footprint_scene_is_closed_with_a_slab():
     from facade_tools.artifacts.footprint import Footprint
 

@@ -31,12 +31,12 @@ def moved(scene: Scene, turn: Floats, step: Floats) -> Scene:
 def shifts(boxes: Sequence[Floats], always: bool = False) -> Floats:
     """Return plan shifts (n, 3) that keep models of the given bounds (2, 3) out of one another.
 
-    Models whose plans are apart stay where they are (a map) unless `always`; otherwise all are
-    put on a grid in reading order, rows away from the viewer, each cell as large as the largest
+    Models stay where they are (a map) unless `always`, or unless most of them stand on one another;
+    then all are put on a grid in reading order, rows away from the viewer, each cell as large as the largest
     plan.
     """
     out = np.zeros((len(boxes), 3))
-    if len(boxes) < 2 or not (always or _any_overlap(boxes)):
+    if len(boxes) < 2 or not (always or _on_one_another(boxes)):
         return out
     columns = int(np.ceil(np.sqrt(len(boxes))))
     cell = np.max([box[1, :2] - box[0, :2] for box in boxes], axis=0) + GAP
@@ -46,16 +46,24 @@ def shifts(boxes: Sequence[Floats], always: bool = False) -> Floats:
     return out
 
 
-def _any_overlap(boxes: Sequence[Floats]) -> bool:
-    order = sorted(boxes, key=lambda box: float(box[0, 0]))
-    active: list[Floats] = []
-    for box in order:
-        active = [other for other in active if other[1, 0] > box[0, 0]]
-        if any(_overlap(box, other) for other in active):
+def _on_one_another(boxes: Sequence[Floats]) -> bool:
+    """Tell variants of one house from a town, in which bounds of neighbours may overlap a little.
+
+    Most of the models share more than half of their plan's bounds with another one.
+    """
+    order = sorted([*low[:2], *high[:2]] for low, high in (box.tolist() for box in boxes))
+    met: set[int] = set()
+    active: list[int] = []
+    for index, box in enumerate(order):
+        active = [k for k in active if order[k][2] > box[0]]
+        met.update(next(((index, k) for k in active if _share_half(box, order[k])), ()))
+        if 2 * len(met) > len(order):
             return True
-        active.append(box)
+        active.append(index)
     return False
 
 
-def _overlap(a: Floats, b: Floats) -> bool:
-    return bool(np.all(np.minimum(a[1, :2], b[1, :2]) - np.maximum(a[0, :2], b[0, :2]) > 0.0))
+def _share_half(a: Sequence[float], b: Sequence[float]) -> bool:
+    width, depth = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])
+    smaller = min((box[2] - box[0]) * (box[3] - box[1]) for box in (a, b))
+    return width > 0.0 and depth > 0.0 and 2.0 * width * depth > smaller

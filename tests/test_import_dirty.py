@@ -408,3 +408,17 @@ def test_thousands_of_parts_below_one_another_are_one_building(order: int) -> No
     city["CityObjects"] = dict(rows[::order])
     found, _ = read(json.dumps(city).encode())
     assert [building.id for building in found] == [root]
+
+
+@pytest.mark.parametrize("value", ["abc", {"x": 1}, 5, True])
+@pytest.mark.parametrize("key", ["parents", "children"])
+def test_relations_that_are_no_lists_are_refused_alone(key: str, value: Any) -> None:
+    city = document()
+    city["CityObjects"]["odd"] = {"type": "Building", key: value}
+    records = detect(json.dumps(city).encode()[:1000]).records
+    found = list(records(io.BytesIO(json.dumps(city).encode()), ReadOptions()))
+    errors = [row.payload for row in found if isinstance(row.payload, InvalidInput)]
+    assert [str(error) for error in errors] == [
+        "/CityObjects/odd: parents or children are no list; expected ids of city objects"
+    ]
+    assert len(found) == 2

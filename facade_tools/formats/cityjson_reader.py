@@ -148,6 +148,10 @@ def _grouped(
             continue
         if not kind_of(item).startswith("Building"):
             continue
+        if any(not isinstance(item.get(key) or [], list) for key in ("parents", "children")):
+            text = "parents or children are no list; expected ids of city objects"
+            yield InvalidInput(text, pointer=f"/CityObjects/{name}")
+            continue
         parents = item.get("parents") or []
         root = name if not parents else root_of.get(str(parents[0]))
         if root is None:

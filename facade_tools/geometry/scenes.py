@@ -31,9 +31,9 @@ def moved(scene: Scene, turn: Floats, step: Floats) -> Scene:
 def shifts(boxes: Sequence[Floats], always: bool = False) -> Floats:
     """Return plan shifts (n, 3) that keep models of the given bounds (2, 3) out of one another.
 
-    Models stay where they are (a map) unless `always`, or unless most of them stand on one another;
-    then all are put on a grid in reading order, rows away from the viewer, each cell as large as the largest
-    plan.
+    Models stay where they are (a map) unless `always`, or unless most of them stand on one
+    another; then all are put on a grid in reading order, rows away from the viewer, each cell as
+    large as the largest plan.
     """
     out = np.zeros((len(boxes), 3))
     if len(boxes) < 2 or not (always or _on_one_another(boxes)):

@@ -201,6 +201,23 @@ layers: [{name: base, x: X, y: Y, shapes: {}}]
 """
 
 
+@pytest.mark.parametrize(
+    ("pattern", "counters"),
+    [
+        ("A^(k-100)", "{k: auto}"),
+        ("A^(2k-90)", "{k: auto}"),
+        ("A^(k-m)", "{k: auto, m: 200}"),
+        ("A^(m-2k)", "{k: auto, m: 206}"),
+        ("A^(k-m)A^(m-92)", "{k: auto, m: {min: 94, max: 95}}"),
+    ],
+)
+def test_a_counter_reaches_what_its_exponent_needs(tmp_path, pattern, counters):
+    text = TILES.replace("A^k", pattern).replace("{k: auto}", counters).replace("P^k", "PP")
+    (tmp_path / "d.yaml").write_text(text)
+    (found,) = solve_design(design(tmp_path / "d.yaml")).x.values()
+    assert found.words == (("A",) * 6,)
+
+
 def png(width, height, data=b"\0\0"):
     chunks = [
         (b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)),

@@ -14,7 +14,7 @@ Grammar (blanks and `·` between parts mean nothing):
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -305,6 +305,21 @@ def counters_of(node: Node) -> set[str]:
             return counters_of(control).union(*(counters_of(part) for _, part in contents))
         case Sequence(parts) | Alternation(parts):
             return set[str]().union(*map(counters_of, parts))
+
+
+def powers_of(node: Node) -> Iterator[Power]:
+    """Yield the powers of a pattern, nested ones included."""
+    match node:
+        case Power(base, _):
+            yield node
+            yield from powers_of(base)
+        case Substituted(control, contents):
+            yield from powers_of(control)
+            for _, part in contents:
+                yield from powers_of(part)
+        case Sequence(parts) | Alternation(parts):
+            for part in parts:
+                yield from powers_of(part)
 
 
 def symbols_of(node: Node) -> set[str]:

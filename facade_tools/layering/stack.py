@@ -11,12 +11,14 @@ from ..artifacts.pointers import escaped
 from ..errors import InvalidInput
 from .language import (
     MAX_DEPTH,
+    Exponent,
     Node,
     PatternError,
     Substituted,
     Symbol,
     counters_of,
     parse,
+    powers_of,
     symbol_pair,
     symbols_of,
 )
@@ -76,10 +78,35 @@ class Stack:
         )
 
     def _counters(self, canvas: float) -> dict[str, tuple[int, int]]:
+        """Return the least and greatest value of every counter.
+
+        One that the solver chooses goes so far that the narrowest symbol fills the canvas, also
+        where the exponent is k - 100 or m - k.
+        """
         sizes = [symbol.size for symbol in self.design.symbols.values() if symbol.size]
-        repeats = (1.0 + TOLERANCES[-1]) * canvas / min([*sizes, canvas])
-        most = min(MOST_REPEATS, int(repeats) + 2)
-        return {name: _range(value, most) for name, value in self.design.counters.items()}
+        repeats = int((1.0 + TOLERANCES[-1]) * canvas / min([*sizes, canvas])) + 2
+        given = {name: _range(value, repeats) for name, value in self.design.counters.items()}
+        most = dict.fromkeys(given, repeats)
+        for pattern in self.patterns.values():
+            for power in powers_of(pattern.node):
+                for name in given:
+                    beside = _offset(power.exponent, name, given)
+                    most[name] = max(most[name], repeats + beside)
+        return {
+            name: _range(value, min(MOST_REPEATS, most[name]))
+            for name, value in self.design.counters.items()
+        }
+
+
+def _offset(exponent: Exponent, name: str, given: Mapping[str, tuple[int, int]]) -> int:
+    """Return how much greater a counter may have to be for what stands beside it."""
+    factors = dict(exponent.terms)
+    own = factors.pop(name, 0)
+    if own == 0:
+        return 0
+    sign = -1 if own > 0 else 1
+    ends = [max(sign * factor * end for end in given[n]) for n, factor in factors.items()]
+    return abs(exponent.constant) + sum(max(0, end) for end in ends)
 
 
 def rules_of(design: Design) -> dict[str, Rule]:

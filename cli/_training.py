@@ -40,7 +40,7 @@ def run_training(
         forest=ForestOptions(values["trees"], values["depth"], values["patch"]),
         network=NetworkOptions(steps=values["steps"]), start=start,
     )  # fmt: skip
-    pairs = list(read_pairs(images, labels, convention(values["classes"])))
+    pairs = read_pairs(images, labels, convention(values["classes"]))
     data = save(train(pairs, options, rng=item_generator(seed, "train-parser")))
     if output == "-":
         to_stdout("", data)

@@ -14,7 +14,9 @@ from facade_tools.imaging.features import pixel_features, shifted
 from facade_tools.imaging.features_context import context_features
 from facade_tools.segmentation.augmentation import varied
 from facade_tools.segmentation.autocontext import run_stages
+from facade_tools.segmentation.autocontext import EARLY_STRIDE, Belief
 from facade_tools.segmentation.boosting import BoostOptions, train_boosted
+from facade_tools.segmentation.boosting import dataset as boosting_dataset
 from facade_tools.segmentation.classifier import Classifier, decoded, default, save
 from facade_tools.segmentation.conventions import CONVENTIONS, convention
 from facade_tools.segmentation.evaluation import Tally, boxes_of_labels, groups, matched
@@ -101,6 +103,42 @@ def test_exported_trees_predict_what_lightgbm_does():
     data = lightgbm.Dataset(codes, labels, weight=np.ones(600))
     raw = lightgbm.train(settings, data, SMALL.rounds).predict(codes, raw_score=True)
     np.testing.assert_allclose(trees.scores(codes), raw, atol=1e-4)
+
+
+def test_batches_of_codes_are_binned_as_one_array_is():
+    import lightgbm
+
+    rng = np.random.default_rng(1)
+    codes = [rng.integers(0, 256, (size, 5)).astype(np.uint8) for size in (9000, 40, 4000)]
+    rows = np.concatenate(codes)
+    labels = (rows[:, 0] > 90).astype(np.intp) + (rows[:, 3] > 200)
+    settings = {"objective": "multiclass", "num_class": 3, "num_leaves": 8, "max_bin": 63,
+                "num_threads": 1, "verbosity": -1, "seed": 5, "deterministic": True,
+                "bin_construct_sample_cnt": 1000}  # fmt: skip
+    weights = np.ones(len(rows), np.float32)
+    parts = boosting_dataset(codes, labels, weights, settings)
+    whole = lightgbm.Dataset(rows.astype(np.float32), labels, weight=weights, params=settings)
+    one, other = (lightgbm.train(settings, data, 3) for data in (parts, whole))
+    assert one.dump_model()["tree_info"] == other.dump_model()["tree_info"]
+
+
+def test_a_belief_is_interpolated_from_every_third_pixel():
+    for shape in ((1, 1), (7, 4), (12, 9)):
+        ramp = np.add.outer(np.arange(shape[0]), np.arange(shape[1])).astype(np.float32)
+        belief = Belief(ramp[None, ::EARLY_STRIDE, ::EARLY_STRIDE], shape)
+        whole = belief.whole()
+        assert whole.shape == (1, *shape)
+        last = [(side - 1) // EARLY_STRIDE * EARLY_STRIDE + 1 for side in shape]
+        np.testing.assert_allclose(whole[0, : last[0], : last[1]], ramp[: last[0], : last[1]], atol=0.05)
+
+
+def test_training_keeps_pairs_only_as_it_reads_them(pairs):
+    options = TrainOptions(
+        stages=3, height=96, coarse=48, pixels=200, early=SMALL, boost=SMALL, network=TREES
+    )
+    listed = train(pairs[:3], options, rng=np.random.default_rng(3))
+    streamed = train(iter(pairs[:3]), options, rng=np.random.default_rng(3))
+    assert save(listed) == save(streamed)
 
 
 def test_features_are_bytes_of_any_picture_and_do_not_change_it():
@@ -280,7 +318,9 @@ def test_conventions_match_the_files_of_the_data_sets(shared_data):
 def test_bad_conventions_are_refused(tmp_path):
     path = tmp_path / "classes.json"
     for text in ("{", '{"classes": [{"index": 1}]}',
-                 '{"classes": [{"index": 1, "colour": [1, 2, 3], "common": "moat"}]}'):  # fmt: skip
+                 '{"classes": [{"index": 1, "colour": [1, 2, 3], "common": "moat"}]}',
+                 '{"classes": []}', "[" * 100_000,
+                 '{"classes": [{"index": 1, "colour": [1e999, 0, 0], "common": "wall"}]}'):  # fmt: skip
         path.write_text(text)
         with pytest.raises(InvalidInput):
             convention(str(path))

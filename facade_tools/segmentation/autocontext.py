@@ -48,6 +48,27 @@ class Example:
     fold: int
 
 
+@dataclass(frozen=True, slots=True)
+class Belief:
+    """Class probabilities at every EARLY_STRIDE-th pixel of a picture, a ninth of its memory.
+
+    asked: (classes, rows, columns). shape: height and width of the picture.
+    """
+
+    asked: Probabilities
+    shape: tuple[int, int]
+
+    def whole(self) -> Probabilities:
+        """Return the probabilities of all pixels, (classes, height, width)."""
+        step = np.array([[1 / EARLY_STRIDE, 0, 0], [0, 1 / EARLY_STRIDE, 0]])
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        size = (self.shape[1], self.shape[0])
+        edge = cv2.BORDER_REPLICATE
+        return np.stack([
+            cv2.warpAffine(one, step, size, flags=flags, borderMode=edge) for one in self.asked
+        ])  # fmt: skip
+
+
 def example(picture: Picture, labels: Labels, height: int, fold: int) -> Example:
     """Return an example whose early stages work at `height` rows."""
     coarse = fitted(picture, height, COARSE_PIXELS)
@@ -65,24 +86,13 @@ def features_of(picture: Picture, before: Probabilities | None) -> Features:
     return np.concatenate([planes, context_features(before), *means])
 
 
-def predict(trees: Trees, features: Features, stride: int = 1) -> Probabilities:
-    """Return class probabilities, (classes, height, width); `stride` asks every n-th pixel only."""
+def predict(trees: Trees, features: Features) -> Belief:
+    """Return what an early stage believes, asked at every EARLY_STRIDE-th pixel."""
     count, height, width = features.shape
-    asked = features[:, ::stride, ::stride]
+    asked = features[:, ::EARLY_STRIDE, ::EARLY_STRIDE]
     codes = np.ascontiguousarray(asked.reshape(count, -1).T)
     shares = np.ascontiguousarray(softmax(trees.scores(codes)).T)
-    coarse = shares.reshape(-1, *asked.shape[1:])
-    return coarse if stride == 1 else _between(coarse, stride, (height, width))
-
-
-def _between(coarse: Probabilities, stride: int, shape: tuple[int, int]) -> Probabilities:
-    """Interpolate planes that were asked at every `stride`-th pixel, from the first on."""
-    step = np.array([[1 / stride, 0, 0], [0, 1 / stride, 0]])
-    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-    size = (shape[1], shape[0])
-    edge = cv2.BORDER_REPLICATE
-    planes = [cv2.warpAffine(one, step, size, flags=flags, borderMode=edge) for one in coarse]
-    return np.stack(planes)
+    return Belief(shares.reshape(-1, *asked.shape[1:]), (height, width))
 
 
 def run_stages(
@@ -100,7 +110,7 @@ def run_stages(
     coarse = fitted(picture, height, COARSE_PIXELS)
     before: Probabilities | None = None
     for trees in stages[:-fine]:
-        before = predict(trees, features_of(coarse, before), EARLY_STRIDE)
+        before = predict(trees, features_of(coarse, before)).whole()
     edges = fine_features(picture)
     first = finished(stages[-fine], planes_of(edges, coarse, before), told)
     if fine == 1:
@@ -132,7 +142,7 @@ def train_stages(
     The belief that a stage trains on comes from models that did not see the picture: the stage
     before is trained once for each fold without it, and once on everything to be kept.
     """
-    before: list[Probabilities | None] = [None] * len(examples)
+    before: list[Belief | None] = [None] * len(examples)
     kept: list[Trees] = []
     for fit in fits[:-FINE]:
         trees, before = _coarse_stage(examples, before, fit, pixels, rng)
@@ -142,24 +152,28 @@ def train_stages(
 
 def _coarse_stage(
     examples: Sequence[Example],
-    before: Sequence[Probabilities | None],
+    before: Sequence[Belief | None],
     fit: Fit,
     pixels: int,
     rng: np.random.Generator,
-) -> tuple[Trees, list[Probabilities | None]]:
+) -> tuple[Trees, list[Belief | None]]:
     """Return a stage, and its belief about each example from a model that did not see it."""
     chosen = [sample_pixels(e.coarse_labels > 0, pixels, rng) for e in examples]
-    codes = [_codes(e, b, at) for e, b, at in zip(examples, before, chosen, strict=True)]
+    codes = [_codes(e, _whole(b), at) for e, b, at in zip(examples, before, chosen, strict=True)]
     labels = [
         e.coarse_labels.ravel()[at].astype(np.intp) - 1
         for e, at in zip(examples, chosen, strict=True)
     ]
     models = _left_out(examples, codes, labels, fit)
     after = [
-        predict(models[e.fold], features_of(e.coarse, b), EARLY_STRIDE)
+        predict(models[e.fold], features_of(e.coarse, _whole(b)))
         for e, b in zip(examples, before, strict=True)
     ]
     return fit(codes, np.concatenate(labels)), list(after)
+
+
+def _whole(belief: Belief | None) -> Probabilities | None:
+    return None if belief is None else belief.whole()
 
 
 def _codes(example: Example, before: Probabilities | None, at: NDArray[np.intp]) -> Codes:
@@ -183,7 +197,7 @@ def _left_out(
 
 def _fine_stages(
     examples: Sequence[Example],
-    before: Sequence[Probabilities | None],
+    before: Sequence[Belief | None],
     fits: Sequence[Fit],
     pixels: int,
     rng: np.random.Generator,
@@ -191,7 +205,7 @@ def _fine_stages(
     """Train on pixels that the stages before leave in doubt."""
     codes, labels = [], []
     for example, belief in zip(examples, before, strict=True):
-        planes = planes_of(fine_features(example.picture), example.coarse, belief)
+        planes = planes_of(fine_features(example.picture), example.coarse, _whole(belief))
         code, label = _in_doubt(example, planes, pixels, rng)
         codes.append(code)
         labels.append(label)
@@ -201,7 +215,7 @@ def _fine_stages(
     models = _left_out(examples, codes, labels, fits[0])
     for i, (example, belief) in enumerate(zip(examples, before, strict=True)):
         edges = fine_features(example.picture)
-        first = finished(models[example.fold], planes_of(edges, example.coarse, belief))
+        first = finished(models[example.fold], planes_of(edges, example.coarse, _whole(belief)))
         again = planes_again(edges, first)
         codes[i], labels[i] = _in_doubt(example, again, pixels, rng)
     yield fits[1](codes, np.concatenate(labels))

@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 from .trees import Codes, Node, Trees, packed
 
 
+BATCH = 4096  # pixels
+
+
 @dataclass(frozen=True, slots=True)
 class BoostOptions:
     """How trees are grown.
@@ -53,13 +56,40 @@ def train_boosted(
         "lambda_l2": 2.0, "max_bin": 63, "num_threads": 1, "verbosity": -1, "seed": seed,
         "deterministic": True, "force_col_wise": True, "bin_construct_sample_cnt": 10_000,
     }  # fmt: skip
-    # LightGBM turns bytes into floats; made here and given away, they are in memory only once
-    rows = np.concatenate(codes, dtype=np.float32)
-    data = lightgbm.Dataset(rows, labels, weight=weights, params=settings).construct()
-    del rows
+    data = dataset(codes, labels, weights, settings)
     booster = lightgbm.train(settings, data, options.rounds)
     dumped = booster.dump_model()["tree_info"]
     return packed([_linked(tree["tree_structure"]) for tree in dumped], classes)
+
+
+def dataset(
+    codes: Sequence[Codes],
+    labels: NDArray[np.intp],
+    weights: NDArray[np.float32],
+    settings: Mapping[str, Any],
+) -> Any:
+    """Return codes as LightGBM bins them, few of them as its floats in memory at once."""
+    import lightgbm
+
+    class Batches(lightgbm.Sequence):
+        batch_size = BATCH
+
+        def __init__(self, rows: Codes) -> None:
+            self.rows = rows
+
+        def __getitem__(self, index: Any) -> NDArray[np.float64]:
+            return self.rows[index].astype(np.float64)
+
+        def __len__(self) -> int:
+            return len(self.rows)
+
+    class Dataset(lightgbm.Dataset):
+        def get_params(self) -> dict[str, Any]:
+            # its own leaves seed and verbosity out, and with them the sample that arrays get
+            return dict(settings)
+
+    data = Dataset([Batches(part) for part in codes], labels, weight=weights, params=dict(settings))
+    return data.construct()
 
 
 def _linked(node: Mapping[str, Any]) -> Node:

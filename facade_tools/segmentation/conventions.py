@@ -88,10 +88,12 @@ def convention(name: str) -> Convention:
         rows = [_row(entry) for entry in document["classes"]]
     except OSError as error:
         raise unreadable(name, error) from None
-    except (ValueError, KeyError, TypeError, IndexError):
+    except (ValueError, KeyError, TypeError, IndexError, OverflowError, RecursionError):
+        rows = []
+    if not rows:
         known = ", ".join(CONVENTIONS)
         message = f'expected {{"classes": [{{"index", "colour", "common"}}]}} or one of {known}'
-        raise InvalidInput(message).at(name) from None
+        raise InvalidInput(message).at(name)
     for index, _, label in rows:
         if label not in (*LABELS[1:], "void") or not 0 <= index < 256:
             raise InvalidInput(f"index {index}: {label!r} is no label").at(name)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -91,8 +91,11 @@ def load_start(path: str) -> Classifier:
     return classifier
 
 
-def train(pairs: Sequence[Pair], options: TrainOptions, *, rng: np.random.Generator) -> Classifier:
-    """Return a classifier of the labels in `pairs`. Raises InvalidInput on fewer than two."""
+def train(pairs: Iterable[Pair], options: TrainOptions, *, rng: np.random.Generator) -> Classifier:
+    """Return a classifier of the labels in `pairs`. Raises InvalidInput on fewer than two.
+
+    Pairs are kept at working size only, so that a generator of them needs less memory.
+    """
     present = np.zeros(len(LABELS), np.bool_)
     small = []
     height = options.coarse if options.features == "patch" else options.height
@@ -100,33 +103,41 @@ def train(pairs: Sequence[Pair], options: TrainOptions, *, rng: np.random.Genera
         small.append(_working(pair, height))
         present[np.unique(small[-1].labels)] = True
     known = [i for i in range(1, len(LABELS)) if present[i]]
-    if len(known) < 2 or len(pairs) < 2:
+    if len(known) < 2 or len(small) < 2:
         raise InvalidInput("needs at least two pictures and two classes to train on")
     index = np.zeros(len(LABELS), np.uint8)
     index[known] = np.arange(1, len(known) + 1)
     small = [replace(pair, labels=index[pair.labels]) for pair in small]
     classes = tuple(LABELS[i] for i in known)
-    about = f"{len(pairs)} pictures, {options.features}"
+    about = f"{len(small)} pictures, {options.features}"
     if options.features == "patch":
         pictures = [(pair.picture, pair.labels) for pair in small]
         trees = train_forest(pictures, len(classes), options.forest, options.pixels, rng=rng)
         return Classifier("patch", classes, (trees,), height, height, options.forest.patch, about)
     (own,) = rng.spawn(1)
-    examples = list(_examples(small, options, rng))
+    stages = _stages(small, len(classes), options, rng)
+    network = None
+    if options.network.steps:
+        network = _network(small, classes, options, own)
+    fine = min(FINE, options.stages)
+    return Classifier("context", classes, stages, height, options.coarse, 0, about, fine, network)
+
+
+def _stages(
+    pairs: Sequence[Pair], classes: int, options: TrainOptions, rng: np.random.Generator
+) -> tuple[Trees, ...]:
+    """Return the stages of trees of pairs at working size."""
+    examples = list(_examples(pairs, options, rng))
     seed = int(rng.integers(2**31))
 
     def fit(boost: BoostOptions, codes: Sequence[Codes], labels: NDArray[np.intp]) -> Trees:
-        weights = class_weights(labels, len(classes), options.balance)
-        return train_boosted(codes, labels, weights, len(classes), boost, seed=seed)
+        weights = class_weights(labels, classes, options.balance)
+        return train_boosted(codes, labels, weights, classes, boost, seed=seed)
 
     fine = min(FINE, options.stages)
     early = [partial(fit, options.early)] * (options.stages - fine)
     fits = early + [partial(fit, options.boost)] * fine
-    stages = train_stages(examples, fits, options.pixels, rng=rng)
-    network = None
-    if options.network.steps:
-        network = _network(small, classes, options, own)
-    return Classifier("context", classes, stages, height, options.coarse, 0, about, fine, network)
+    return train_stages(examples, fits, options.pixels, rng=rng)
 
 
 def _network(

@@ -34,6 +34,7 @@ def run_rectify(image: str, output: str | None, corners: str, report: str | None
     except InvalidInput as error:
         raise error.at(image) from None
     LOG.info("%s: confidence %.2f", image, found.confidence)
+    _tell_guess(image, found)
     ending = ".png" if output == "-" else Path(output).suffix.lower()
     try:
         data = encoded(found.picture(photo.pixels), ending)
@@ -46,9 +47,14 @@ def run_rectify(image: str, output: str | None, corners: str, report: str | None
     if report is not None:
         document = {
             "homography": found.homography.tolist(), "confidence": found.confidence,
-            "size": list(found.size), "image": {"name": photo.name, "sha256": photo.sha256},
+            "guessed": found.guessed, "size": list(found.size), "image": {"name": photo.name, "sha256": photo.sha256},
         }  # fmt: skip
         write_bytes(Path(report), dump_document(document))
+
+
+def _tell_guess(image: str, found: Rectification) -> None:
+    if found.guessed:
+        LOG.warning("%s: its lines do not tell the focal length; width to height is a guess", image)
 
 
 def _found(photo: Photo, corners: Points | None) -> Rectification:
@@ -69,11 +75,11 @@ def _is_report(asked: str) -> bool:
 
 def rectification_of(photo: Photo, asked: str) -> Rectification:
     """Return the rectification that `--rectify` asks for: auto, four corners, or a report."""
-    if asked == "auto":
-        return automatic(photo.pixels)
     if _is_report(asked):
         return _reported(photo, asked)
-    return from_corners(photo.pixels.shape, _corners(asked))
+    found = _found(photo, None if asked == "auto" else _corners(asked))
+    _tell_guess(photo.name, found)
+    return found
 
 
 def _reported(photo: Photo, path: str) -> Rectification:

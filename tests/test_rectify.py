@@ -71,6 +71,14 @@ def test_corners_give_back_the_true_proportions(turn):
     np.testing.assert_allclose(target, expected, atol=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("turn", "guessed"),
+    [((0, 0, 0), False), ((0, 0.4, 0), True), ((0.3, 0, 0), True), ((0.1, 0.4, 0.0), False)],
+)
+def test_proportions_that_hang_on_the_focal_length_are_called_a_guess(turn, guessed):
+    assert from_corners((700, 640, 3), photographed(turn)[0]).guessed is guessed
+
+
 @pytest.mark.parametrize("turn", [(0.12, 0.35, 0.03), (-0.15, -0.25, -0.04), (0.2, 0.2, 0)])
 def test_lines_alone_make_a_facade_straight(front, turn):
     corners, homography = photographed(turn)
@@ -107,6 +115,9 @@ def test_pictures_without_structure_are_refused(kind):
         [[0, 0], [10, 10], [10, 0], [0, 10]],
         [[0, 0], [5, 0], [10, 0], [0, 10]],
         [[0, 0], [0, 10], [10, 10], [10, 0]],
+        [[11, 0], [10, 10], [0, 10], [0, 0]],
+        [[10, 11], [0, 10], [0, 0], [10, 0]],
+        [[0, 10], [0, 0], [9, 0], [10, 11]],
         [[0, 0], [np.nan, 0], [10, 10], [0, 10]],
         [[30, 0], [40, 0], [40, 10], [30, 10]],
         [[45, -35], [75, -5], [55, 15], [25, -15]],
@@ -135,8 +146,14 @@ def test_the_command(facade, front, tmp_path):
     told = json.loads(report.read_text())
     picture = decoded(out.read_bytes(), "front")
     assert list(picture.shape[1::-1]) == told["size"]
+    assert told["guessed"] is False
+    assert b"guess" not in done.stderr
     near = cv2.resize(front, told["size"]).astype(float) - picture
     assert np.abs(near).mean() < 12
+    level = "90,40 400,110 400,560 90,630"
+    done = facade("rectify", photo, "--corners", level, "-o", out)
+    assert done.returncode == 0
+    assert b"width to height is a guess" in done.stderr
     assert facade("rectify", photo, "--corners", "1,2 3,4", "-o", out).returncode == 2
     before = photo.read_bytes()
     for words in (("-o", photo), ("-o", tmp_path / "a.png", "--report", photo)):

@@ -8,7 +8,7 @@ up to scale; where they do not fix the focal length (one of them far away) a usu
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -24,6 +24,8 @@ Vector = NDArray[np.float64]  # (3,) homogeneous
 USUAL_FOCAL = 1.1  # of the longer side
 FOCALS = (0.35, 6.0)  # of the longer side: what a camera may have
 LEAST_CONFIDENCE = 0.35
+LEAST_LEAN = np.radians(5.0)  # from where proportions hang on the focal length
+LEAST_TELLING = np.radians(2.0)  # out of the picture's plane: both directions, to tell that length
 MOST_GROWTH = 3.0  # of a side
 LEAST_SIDE = 16  # pixels
 LARGEST_ENTRY = 1e12  # of a homography: products of three stay far from overflow
@@ -35,11 +37,13 @@ class Rectification:
 
     homography: pixels of the photograph to pixels of the rectified picture. confidence: share of
     line length that agrees with the two directions (1 for corners). size: (width, height).
+    guessed: the proportions hang on a focal length that the picture does not tell.
     """
 
     homography: Homography
     confidence: float
     size: tuple[int, int]
+    guessed: bool = False
 
     @property
     def rows(self) -> tuple[tuple[float, ...], ...]:
@@ -61,7 +65,7 @@ def from_corners(shape: tuple[int, ...], corners: Points) -> Rectification:
     _check_seen(shape, corners)
     lines = [_line(corners[i], corners[(i + 1) % 4]) for i in range(4)]
     across, down = np.cross(lines[0], lines[2]), np.cross(lines[1], lines[3])
-    metric = _metric(shape, across, down)
+    metric, guessed = _metric(shape, across, down)
     straight = applied(metric, corners)
     sides = np.linalg.norm(np.roll(straight, -1, axis=0) - straight, axis=1)
     given = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
@@ -70,7 +74,7 @@ def from_corners(shape: tuple[int, ...], corners: Points) -> Rectification:
     scale = np.sqrt((given[0] + given[2]) * (given[1] + given[3]) / (width * height)) / 2
     size = _size(width * scale, height * scale, shape)
     target = np.array([[0, 0], [size[0], 0], size, [0, size[1]]], np.float64)
-    return Rectification(fitted_homography(corners, target), 1.0, size)
+    return Rectification(fitted_homography(corners, target), 1.0, size, guessed)
 
 
 def from_report(
@@ -100,8 +104,8 @@ def automatic(picture: Picture) -> Rectification:
     if confidence < LEAST_CONFIDENCE:
         message = f"shows too few lines in two directions (confidence {confidence:.2f}); "
         raise InvalidInput(message + "name the corners")
-    metric = _metric(picture.shape, across, down)
-    return _framed(picture.shape, metric, confidence)
+    metric, guessed = _metric(picture.shape, across, down)
+    return replace(_framed(picture.shape, metric, confidence), guessed=guessed)
 
 
 def _line(one: Vector, other: Vector) -> Vector:
@@ -112,7 +116,10 @@ def _check_convex(corners: Points) -> None:
     sides = np.roll(corners, -1, axis=0) - corners
     following = np.roll(sides, -1, axis=0)
     turns = sides[:, 0] * following[:, 1] - sides[:, 1] * following[:, 0]
-    if not np.isfinite(corners).all() or (turns <= 1e-6).any():
+    right, below = sides[0] - sides[2], sides[1] - sides[3]
+    # more upright than if it began at another corner, which would turn the picture on its side
+    upright = right[0] + below[1] > abs(below[0] - right[1])
+    if not np.isfinite(corners).all() or (turns <= 1e-6).any() or not upright:
         message = "corners are no convex quadrilateral in the order top left, top right, "
         raise InvalidInput(message + "bottom right, bottom left")
 
@@ -125,16 +132,18 @@ def _check_seen(shape: tuple[int, ...], corners: Points) -> None:
         raise InvalidInput(f"corners lie outside the picture ({width}×{height} pixels)")
 
 
-def _metric(shape: tuple[int, ...], across: Vector, down: Vector) -> Homography:
+def _metric(shape: tuple[int, ...], across: Vector, down: Vector) -> tuple[Homography, bool]:
     """Return the homography that undoes the perspective of a plane with two orthogonal directions.
 
-    The middle of the picture keeps its place and scale.
+    The middle of the picture keeps its place and scale. Also tell whether the plane leans so much
+    that the focal length matters, in but one of its directions, which does not tell it.
     """
     height, width = shape[:2]
     longer = max(height, width)
     middle = np.array([[1, 0, -width / 2], [0, 1, -height / 2], [0, 0, 1.0]])
     one, other = _unit(middle @ across), _unit(middle @ down)
-    focal = _focal(one, other, longer)
+    measured = _focal(one, other, longer)
+    focal = USUAL_FOCAL * longer if measured is None else measured
     camera = np.diag([1 / focal, 1 / focal, 1.0])
     right, below = _unit(camera @ one), _unit(camera @ other)
     right = right if right[0] > 0 else -right
@@ -145,8 +154,9 @@ def _metric(shape: tuple[int, ...], across: Vector, down: Vector) -> Homography:
     inverse /= inverse[2, 2]
     scale = np.sqrt(abs(np.linalg.det(inverse[:2, :2] - np.outer(inverse[:2, 2], inverse[2, :2]))))
     upright = np.diag([1 / scale, 1 / scale, 1.0]) @ inverse
-    metric: Homography = np.linalg.inv(middle) @ upright @ middle
-    return metric
+    leans = abs(float(np.cross(right, below)[2])) < np.cos(LEAST_LEAN)
+    faint = min(abs(float(right[2])), abs(float(below[2]))) < np.sin(LEAST_TELLING)
+    return np.linalg.inv(middle) @ upright @ middle, bool(leans and (measured is None or faint))
 
 
 def _unit(vector: Vector) -> Vector:
@@ -154,13 +164,16 @@ def _unit(vector: Vector) -> Vector:
     return unit
 
 
-def _focal(one: Vector, other: Vector, longer: int) -> float:
-    """Return the focal length for which two vanishing points are orthogonal, pixels."""
+def _focal(one: Vector, other: Vector, longer: int) -> float | None:
+    """Return the focal length for which two vanishing points are orthogonal, pixels.
+
+    None where they do not fix one that a camera may have.
+    """
     if min(abs(one[2]), abs(other[2])) > 1e-9:
         square = -(one[0] * other[0] + one[1] * other[1]) / (one[2] * other[2])
         if (FOCALS[0] * longer) ** 2 < square < (FOCALS[1] * longer) ** 2:
             return float(np.sqrt(square))
-    return USUAL_FOCAL * longer
+    return None
 
 
 def _framed(shape: tuple[int, ...], metric: Homography, confidence: float) -> Rectification:

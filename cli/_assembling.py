@@ -29,6 +29,7 @@ from ._stream import ItemResult, open_sink, run_items, side_input
 NAME = "assemble"
 SIZE = re.compile(r"(\d+(?:\.\d+)?)[x×](\d+(?:\.\d+)?)")
 SIDE_LIMITS = (2.0, 1000.0)  # m
+RECORDED = ("side", "roof", "storey_height", "windows", "no_door", "metres")
 PITCH = 35.0  # degrees of a roof whose pitch nobody says
 
 Item = RawItem | str  # of a stream of artifacts, or the path of a label map
@@ -77,7 +78,10 @@ def run_assemble(stream: StreamOptions, values: Mapping[str, Any]) -> None:
     if bool(given) == bool(stream.inputs):
         raise click.UsageError("name parses, or sides with --front, --back, --left, --right")
     footprint = values["footprint"]
-    recorded = {key: values[key] for key in ("side", "roof", "storey_height", "windows", "no_door")}
+    measured = footprint if footprint and SIZE.fullmatch(footprint) else None
+    recorded = {key: values[key] for key in RECORDED} | {
+        "footprint": measured, "classes": Path(values["classes"]).name
+    }  # fmt: skip
     stage = Assemble(
         Assembly(
             None if footprint is None else _ground(footprint, values["metres"]),
@@ -89,7 +93,7 @@ def run_assemble(stream: StreamOptions, values: Mapping[str, Any]) -> None:
         values["side"],
         convention(values["classes"]),
         recorded,
-        side_input(footprint if footprint and not SIZE.fullmatch(footprint) else None),
+        side_input(None if measured else footprint),
         stream.output is not None and stream.output.lower().endswith(".json"),
     )
     if not given:

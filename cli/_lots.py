@@ -15,6 +15,7 @@ from facade_tools.artifacts.footprint import Footprint
 from facade_tools.artifacts.store import RawItem, read_raw
 from facade_tools.errors import InvalidInput, Place
 from facade_tools.formats.importing import items
+from facade_tools.formats.osm import states_height
 from facade_tools.formats.reading import BY_NAME, ReadOptions
 from facade_tools.geometry.polygons import Rings, rings_of, sound
 
@@ -77,7 +78,10 @@ def _plot(artifact: Footprint | Building | RawItem | InvalidInput) -> Plot:
 
 
 def artifacts_of(path: str, metres: bool) -> Iterator[Footprint | Building]:
-    """Yield the footprints and buildings of a file, GeoJSON or artifacts."""
+    """Yield the footprints and buildings of a file, GeoJSON or artifacts.
+
+    The height of a footprint is 0 where its map states none.
+    """
     for record in _records(path, metres):
         if isinstance(record, InvalidInput):
             raise record
@@ -99,7 +103,12 @@ def _records(path: str, metres: bool) -> Iterator[Footprint | RawItem | InvalidI
             place = Place(path, item.record.line, item.record.pointer or error.place.pointer)
             yield InvalidInput(error.message, place)
             continue
-        yield from (_named(row, path) for row in built if isinstance(row, Footprint))
+        yield from (_stated(_named(row, path)) for row in built if isinstance(row, Footprint))
+
+
+def _stated(artifact: Footprint) -> Footprint:
+    """Return a footprint of a map with the height 0 where the map states none."""
+    return artifact if states_height(artifact.tags) else replace(artifact, height=0.0)
 
 
 def _named(artifact: Footprint, path: str) -> Footprint:

@@ -209,6 +209,26 @@ def test_the_command_takes_label_maps_and_named_sides(tmp_path, facade_here):
     assert len(document["provenance"]["inputs"]) == 2
 
 
+@pytest.mark.parametrize(("tags", "eaves", "storey"), [
+    ({}, 12.0, 3.0), ({"building:levels": 5}, 15.0, 3.75), ({"height": "20 m"}, 20.0, 5.0),
+])  # fmt: skip
+def test_a_map_without_heights_leaves_them_to_the_picture(
+    tmp_path, facade_here, tags, eaves, storey
+):
+    ring = [[0, 0], [13, 0], [13, 8], [0, 8], [0, 0]]
+    feature = {"type": "Feature", "properties": {"building": "yes", **tags},
+               "geometry": {"type": "Polygon", "coordinates": [ring]}}  # fmt: skip
+    (tmp_path / "plot.geojson").write_text(json.dumps(feature))
+    cv2.imwrite(str(tmp_path / "a.png"), label_map(4, 5))
+    plot = ("--footprint", tmp_path / "plot.geojson", "--metres")
+    done = facade_here("assemble", "--front", tmp_path / "a.png", *plot)
+    assert done.returncode == 0, done.stderr
+    building = json.loads(done.stdout)
+    assert [box["height"] for box in building["boxes"]] == [eaves]
+    assert building["storey_height"] == storey
+    assert building["provenance"]["options"]["metres"] is True
+
+
 @pytest.mark.parametrize(("arguments", "code", "word"), [
     ((), 2, b"name parses"), (("--front", "missing.json"), 3, b"missing.json"),
     (("--front", "x.png", "--roof", "onion"), 2, b"expected STYLE"),

@@ -162,6 +162,12 @@ def _bare(value: object) -> str:
     return re.sub(r"\s*(°|deg(rees?)?)$", "", str(value).strip(), flags=re.I)
 
 
+def states_height(tags: Mapping[str, object]) -> bool:
+    """Tell whether tags say how high a building is; otherwise its height is assumed."""
+    known = canonical(tags)
+    return any(length(known.get(name, "")) for name in ("height", "building:levels"))
+
+
 def _heights(tags: Mapping[str, object], notes: Counter[str]) -> tuple[float | None, float | None]:
     """Return the height of the roof's top, or that of the eaves, whichever is stated."""
     total = length(tags.get("height", ""))

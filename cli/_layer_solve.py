@@ -51,7 +51,7 @@ class CanvasSolver:
         design = self.design
         if self.sweep:
             width, height = canvas[0] or design.canvas.width, canvas[1] or design.canvas.height
-            design = replace(design, id=f"{design.id}-{width:g}x{height:g}")
+            design = replace(design, id=f"{design.id}-{width:.12g}x{height:.12g}")
         for found in _layouts(design, canvas, self.seed, self.options):
             assets = _used(self.assets, found)
             full = replace(found, assets=assets, provenance=self.provenance)

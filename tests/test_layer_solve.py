@@ -218,6 +218,27 @@ def test_a_counter_reaches_what_its_exponent_needs(tmp_path, pattern, counters):
     assert found.words == (("A",) * 6,)
 
 
+def test_many_layers_have_at_least_the_layout_of_whole_words(tmp_path):
+    names = [f"S{i}" for i in range(14)]
+    document = {
+        "canvas": {"width": 10, "height": 3},
+        "symbols": {"P": {"size": 3}, **{n: {"size": 1 + 0.04 * i} for i, n in enumerate(names)}},
+        "counters": {"k": "auto"},
+        "patterns": {"Y": "P", **{f"X{n}": f"{n}^k" for n in names}},
+        "layers": [{"name": n, "x": f"X{n}", "y": "Y"} for n in names],
+    }
+    (tmp_path / "d.yaml").write_text(json.dumps(document))
+    layout = solve_design(design(tmp_path / "d.yaml"), time_limit=1.5)
+    check(layout)
+    (found,) = layout.x.values()
+    assert found.alignment_error <= found.tolerance * 10 * (1 + 1e-9)
+    above = replace(design(tmp_path / "d.yaml").symbols["S13"], unoccludable=True)
+    kept = design(tmp_path / "d.yaml")
+    kept = replace(kept, symbols={**kept.symbols, "S13": above})
+    with pytest.raises(Infeasible):
+        solve_design(kept, time_limit=1.5)
+
+
 def png(width, height, data=b"\0\0"):
     chunks = [
         (b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,9 +10,19 @@ import numpy as np
 from .alignment import Aligner
 from .candidates import Generator
 from .evaluation import evaluate, least_error
-from .problem import LEAST_UNSIZED, SLACK, TOLERANCES, Alignment, Candidate, Direction
+from .problem import (
+    LEAST_UNSIZED,
+    SLACK,
+    TOLERANCES,
+    Alignment,
+    Candidate,
+    Direction,
+    Rule,
+    Span,
+)
 from .sizing import conflict
 from .tasks import Effort, Task, key_of
+from .words import Letter, Word
 
 UNITS = 8  # lengths that sizes are rounded to, at most
 DRAWS = 3  # of the unsized sizes, for each of them
@@ -53,6 +63,25 @@ class Rescue:
                     found.append(own)
         canvas = self.direction.canvas
         return min(found, key=lambda one: key_of(one, canvas), default=None)
+
+    def in_one_column(self, candidate: Candidate, tolerance: float) -> Alignment | None:
+        """Return the alignment that leaves every word whole, or None where it may not stand."""
+        words = candidate.words
+        if len(candidate.parts) > 1 or not self._is_column(words):
+            return None
+        ends = tuple(Span(len(word)) for word in words)
+        path = Alignment(candidate, ((Span(0),) * len(words), ends), 0.0, 0.0, 0, tolerance)
+        found = self._preferred(path, candidate, tolerance)
+        return found if found is not None and self.admits(found, tolerance) else None
+
+    def _is_column(self, words: Sequence[Word]) -> bool:
+        """Tell whether words may stand above one another (IMAW15 5.2)."""
+        rules = self.direction.rules
+        covered = any(word and all(map(self.direction.is_opaque, word)) for word in words)
+        mixed = any(len({a.transparent for a in word}) > 1 for word in words)
+        last = max((i for i, w in enumerate(words) if any(_is_kept(rules, a) for a in w)), default=0)
+        clear = all(a.transparent for word in words[:last] for a in word)
+        return covered and clear and not mixed
 
     def _generator(self, tolerance: float) -> Generator:
         return Generator(self.direction, self.groups, tolerance)
@@ -107,6 +136,10 @@ class Rescue:
             if tolerance < found.tolerance and self.admits(found, tolerance):
                 return replace(found, tolerance=tolerance)
         return found
+
+
+def _is_kept(rules: Mapping[str, Rule], letter: Letter) -> bool:
+    return rules[letter.symbol].unoccludable
 
 
 def _units(direction: Direction, candidate: Candidate) -> list[float]:

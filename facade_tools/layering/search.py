@@ -173,13 +173,18 @@ class GroupSearch:
         return best
 
     def _secured(self) -> Alignment | None:
-        """Return any alignment, soon: the first that beams find at the greatest tolerance."""
+        """Return any alignment, soon: the first that beams find at the greatest tolerance.
+
+        Where they find none, one whose words are whole.
+        """
         whole = self.clock
+        rescue = Rescue(
+            self.direction, self.groups, lambda ahead: self.clock.over(ahead), whole.now
+        )
         for stage in STAGES[-2:]:
             self.clock = whole.share(0.25)
             budget = stage.tolerance * self.direction.canvas
             rng = item_generator(1, "layer-solve", *self.groups)
-            rescue = Rescue(self.direction, self.groups, self.clock.over, self.clock.now)
             for candidate in self._sampled(stage.tolerance):
                 found = None
                 if self._hopeful(candidate, stage, budget):
@@ -188,8 +193,12 @@ class GroupSearch:
                 if found is not None:
                     self.clock = whole
                     return rescue.tightened(found)
+        self.clock = whole.share(0.25)
+        last = STAGES[-1].tolerance
+        columns = (rescue.in_one_column(one, last) for one in self.candidates(last))
+        found = next((one for one in columns if one is not None), None)
         self.clock = whole
-        return None
+        return None if found is None else rescue.tightened(found)
 
     def _best_beam(
         self, candidates: Iterator[Candidate], stage: Stage, best: Alignment | None

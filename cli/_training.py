@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from facade_tools.artifacts.writing import write_bytes
+from facade_tools.errors import InvalidInput
 from facade_tools.randomness import item_generator
 from facade_tools.segmentation.boosting import BoostOptions
 from facade_tools.segmentation.classifier import save
@@ -26,8 +27,8 @@ def run_training(
     images: str, labels: str, output: str | None, seed: int, values: Mapping[str, Any]
 ) -> None:
     """Read the pairs, train, write the npz."""
-    if output is None:
-        raise click.UsageError("Missing option '-o': name a .npz file.")
+    if output is None or (output != "-" and Path(output).suffix.lower() != ".npz"):
+        raise click.UsageError("Option '-o': name a .npz file.")
     coarse, height = values["coarse"], values["height"]
     if coarse is not None and coarse > height:
         raise click.UsageError(f"--coarse {coarse} is above --height {height}")
@@ -41,7 +42,10 @@ def run_training(
         network=NetworkOptions(steps=values["steps"]), start=start,
     )  # fmt: skip
     pairs = read_pairs(images, labels, convention(values["classes"]))
-    data = save(train(pairs, options, rng=item_generator(seed, "train-parser")))
+    try:
+        data = save(train(pairs, options, rng=item_generator(seed, "train-parser")))
+    except InvalidInput as error:
+        raise error.at(images) from None
     if output == "-":
         to_stdout("", data)
     else:

@@ -374,6 +374,14 @@ def test_train_parser_end_to_end(facade, pairs, tmp_path):
     missing = facade("train-parser", tmp_path, tmp_path / "labels", "-o", out)
     assert missing.returncode == 3
     folders = (tmp_path / "images", tmp_path / "labels")
+    assert facade("train-parser", *folders, "-o", folders[0] / "p0.png").returncode == 2
+    (folders[1] / "p0.png").rename(folders[1] / "p0.PNG")
+    assert facade("train-parser", *folders, *options, "-o", out).returncode == 0
+    (folders[1] / "p0.PNG").unlink()
+    alone = facade("train-parser", *folders, *options, "-o", tmp_path / "none.npz")
+    assert alone.returncode == 3
+    assert b"1 pictures have no label map" in alone.stderr
+    assert b"images: needs at least two pictures" in alone.stderr
     high = facade("train-parser", *folders, "--height", 96, "--coarse", 97, "-o", out)
     assert high.returncode == 2
     assert b"--coarse 97 is above --height 96" in high.stderr

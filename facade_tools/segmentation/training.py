@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -26,6 +27,8 @@ from .patches import ForestOptions, train_forest
 from .trees import Codes, Trees
 
 MAX_PICTURES = 100_000
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,10 +74,12 @@ def read_pairs(images: str, labels: str, convention: Convention) -> Iterator[Pai
     Pictures without a map are left out. Raises InvalidInput where none has one or sizes differ.
     """
     found = sorted(p for p in Path(images).glob("*") if p.suffix.lower() in PICTURES)
-    maps = {p.stem: p for p in Path(labels).glob("*.png")}
+    maps = {p.stem: p for p in Path(labels).glob("*") if p.suffix.lower() == ".png"}
     both = [path for path in found if path.stem in maps]
     if not both:
         raise InvalidInput("holds no picture with a label map of the same name").at(images)
+    if len(both) < len(found):
+        log.warning("%s: %d pictures have no label map", images, len(found) - len(both))
     for path in both[:MAX_PICTURES]:
         photo = read_photo(str(path))
         known = convention.read(str(maps[path.stem]))

@@ -218,6 +218,15 @@ def test_a_counter_reaches_what_its_exponent_needs(tmp_path, pattern, counters):
     assert found.words == (("A",) * 6,)
 
 
+@pytest.mark.parametrize("control", ["xc|x", "xcc|x", "x(cc)^(k-4)"])
+def test_a_content_that_does_not_fit_leaves_the_words_without_it(tmp_path, control):
+    text = TILES.replace('X: "A^k"', f'X: "A^k", T: {{control: "{control}", c: "L"}}')
+    text = text.replace("A: {", "L: {size: 9}, A: {").replace("[{", "[{name: top, x: T, y: Y}, {")
+    (tmp_path / "d.yaml").write_text(text.replace("width: 6", "width: 4").replace("P^k", "PP"))
+    (found,) = solve_design(design(tmp_path / "d.yaml")).x.values()
+    assert found.words == (("x",), ("A",) * 4)
+
+
 def test_many_layers_have_at_least_the_layout_of_whole_words(tmp_path):
     names = [f"S{i}" for i in range(14)]
     document = {

@@ -19,6 +19,7 @@ from facade_tools.errors import Infeasible, InvalidInput
 from facade_tools.layering.alignment import prepare
 from facade_tools.layering.evaluation import evaluate
 from facade_tools.layering.language import PatternError, Substituted, parse, symbol_pair
+from facade_tools.layering.lattice import lattices
 from facade_tools.layering.problem import Candidate, Direction, LayerPattern, Rule, Span
 from facade_tools.layering.search import Clock, GroupSearch
 from facade_tools.layering.solve import solve_direction
@@ -54,6 +55,17 @@ def columns(alignment):
         ["".join(a.name for a in alignment.column(i, j)) for j in range(alignment.count)]
         for i in rows
     ]
+
+
+@pytest.mark.parametrize("control", ["(A|B)^3|Ac", "(A|B)^3|Acc", "(A|B)^3c^(k-2)"])
+def test_lattices_do_without_a_content_that_does_not_fit(control):
+    node = Substituted(parse(control), (("c", parse("AAAAAAAA")),))
+    how = Expansion({"k": 2}, dict.fromkeys("ABc", 1.0), 5.0)
+    family = lattices(node, how, frozenset())
+    assert sum(one.size > 0 for one in family.classes) == 4
+    assert {frozenset(a.symbol for a in word) for word in family.words} == {
+        frozenset(a.symbol for a in word) for word in expand(node, how).words
+    }
 
 
 class TestLanguage:

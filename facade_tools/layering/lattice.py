@@ -170,7 +170,7 @@ class _Builder:
         self.how, self.attached, self.symbols = how, attached, symbols
         kinds = [(name, clear) for name in symbols for clear in (False, True)]
         self.places = {kind: at for at, kind in enumerate(kinds)}
-        self.bound: dict[str, Word | Node] = {}
+        self.bound: dict[str, Word | Node | None] = {}
         self.nodes = 0
         self.complete = True
 
@@ -205,6 +205,8 @@ class _Builder:
     def _symbol(self, name: str, front: Front, control: bool, back: bool) -> Front:
         if control and name in self.bound:
             bound = self.bound[name]
+            if bound is None:
+                return {}
             if isinstance(bound, tuple):
                 return self._word(reflected(bound, self.how.reflection) if back else bound, front)
             return self._inner(bound, front, back)
@@ -266,13 +268,16 @@ class _Builder:
         return out
 
     def _substituted(self, node: Substituted, front: Front, back: bool) -> Front:
-        """Every instance of a symbol is the same word; one that stands once needs no list."""
-        choices: list[list[Word | Node]] = []
+        """Every instance of a symbol is the same word; one that stands once needs no list.
+
+        A content of which no word fits leaves the control words that do without the symbol.
+        """
+        choices: list[list[Word | Node | None]] = []
         for name, part in node.contents:
             if _times(node.control, name, self.how.counters) == 1:
                 choices.append([part])
                 continue
-            choices.append([*self._alike(part)])
+            choices.append([*self._alike(part)] or [None])
         outer = self.bound
         fronts = []
         for picked in product(*choices):

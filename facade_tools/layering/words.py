@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import product
 from typing import Literal, NamedTuple
@@ -81,7 +81,7 @@ class _Expander:
     def __init__(self, how: Expansion) -> None:
         self.how = how
         self.complete = True
-        self.bound: dict[str, Word] = {}
+        self.bound: dict[str, Word | None] = {}
 
     def words(self, node: Node, control: bool) -> WordList:
         found = self._node(node, control)
@@ -105,7 +105,8 @@ class _Expander:
 
     def _symbol(self, name: str, control: bool) -> list[Word]:
         if control and name in self.bound:
-            return [self.bound[name]]
+            bound = self.bound[name]
+            return [] if bound is None else [bound]
         transparent = control or name in self.how.transparent
         word = (Letter(name, False, transparent),)
         return [word] if self.size(word) <= self.how.limit else []
@@ -162,9 +163,14 @@ class _Expander:
         return out
 
     def _substituted(self, inner: Node, contents: tuple[tuple[str, Node], ...]) -> list[Word]:
-        """Every instance of a substituted symbol is the same word of its content pattern."""
+        """Every instance of a substituted symbol is the same word of its content pattern.
+
+        A content of which no word fits leaves the control words that do without the symbol.
+        """
         outer = self.bound
-        choices = [self._node(part, isinstance(part, Substituted)) for _, part in contents]
+        choices: list[Iterable[Word | None]] = [
+            self._node(part, isinstance(part, Substituted)) or [None] for _, part in contents
+        ]
         out: dict[Word, None] = {}
         for picked in product(*choices):
             self.bound = dict(zip((name for name, _ in contents), picked, strict=True))

@@ -47,7 +47,8 @@ def run_rectify(image: str, output: str | None, corners: str, report: str | None
     if report is not None:
         document = {
             "homography": found.homography.tolist(), "confidence": found.confidence,
-            "guessed": found.guessed, "size": list(found.size), "image": {"name": photo.name, "sha256": photo.sha256},
+            "guessed": found.guessed, "size": list(found.size),
+            "image": {"name": photo.name, "sha256": photo.sha256},
         }  # fmt: skip
         write_bytes(Path(report), dump_document(document))
 

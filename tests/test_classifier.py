@@ -13,8 +13,7 @@ from facade_tools.grammar.library import builtin
 from facade_tools.imaging.features import pixel_features, shifted
 from facade_tools.imaging.features_context import context_features
 from facade_tools.segmentation.augmentation import varied
-from facade_tools.segmentation.autocontext import run_stages
-from facade_tools.segmentation.autocontext import EARLY_STRIDE, Belief
+from facade_tools.segmentation.autocontext import EARLY_STRIDE, Belief, run_stages
 from facade_tools.segmentation.boosting import BoostOptions, train_boosted
 from facade_tools.segmentation.boosting import dataset as boosting_dataset
 from facade_tools.segmentation.classifier import Classifier, decoded, default, save
@@ -129,7 +128,9 @@ def test_a_belief_is_interpolated_from_every_third_pixel():
         whole = belief.whole()
         assert whole.shape == (1, *shape)
         last = [(side - 1) // EARLY_STRIDE * EARLY_STRIDE + 1 for side in shape]
-        np.testing.assert_allclose(whole[0, : last[0], : last[1]], ramp[: last[0], : last[1]], atol=0.05)
+        np.testing.assert_allclose(
+            whole[0, : last[0], : last[1]], ramp[: last[0], : last[1]], atol=0.05
+        )
 
 
 def test_training_keeps_pairs_only_as_it_reads_them(pairs):
@@ -317,10 +318,14 @@ def test_conventions_match_the_files_of_the_data_sets(shared_data):
 
 def test_bad_conventions_are_refused(tmp_path):
     path = tmp_path / "classes.json"
-    for text in ("{", '{"classes": [{"index": 1}]}',
-                 '{"classes": [{"index": 1, "colour": [1, 2, 3], "common": "moat"}]}',
-                 '{"classes": []}', "[" * 100_000,
-                 '{"classes": [{"index": 1, "colour": [1e999, 0, 0], "common": "wall"}]}'):  # fmt: skip
+    for text in (
+        "{",
+        '{"classes": [{"index": 1}]}',
+        '{"classes": [{"index": 1, "colour": [1, 2, 3], "common": "moat"}]}',
+        '{"classes": []}',
+        "[" * 100_000,
+        '{"classes": [{"index": 1, "colour": [1e999, 0, 0], "common": "wall"}]}',
+    ):
         path.write_text(text)
         with pytest.raises(InvalidInput):
             convention(str(path))

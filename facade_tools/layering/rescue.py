@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,12 +17,11 @@ from .problem import (
     Alignment,
     Candidate,
     Direction,
-    Rule,
     Span,
 )
 from .sizing import conflict
 from .tasks import Effort, Task, key_of
-from .words import Letter, Word
+from .words import Word
 
 UNITS = 8  # lengths that sizes are rounded to, at most
 DRAWS = 3  # of the unsized sizes, for each of them
@@ -79,7 +78,8 @@ class Rescue:
         rules = self.direction.rules
         covered = any(word and all(map(self.direction.is_opaque, word)) for word in words)
         mixed = any(len({a.transparent for a in word}) > 1 for word in words)
-        last = max((i for i, w in enumerate(words) if any(_is_kept(rules, a) for a in w)), default=0)
+        kept = [any(rules[a.symbol].unoccludable for a in word) for word in words]
+        last = max((i for i, one in enumerate(kept) if one), default=0)
         clear = all(a.transparent for word in words[:last] for a in word)
         return covered and clear and not mixed
 
@@ -136,10 +136,6 @@ class Rescue:
             if tolerance < found.tolerance and self.admits(found, tolerance):
                 return replace(found, tolerance=tolerance)
         return found
-
-
-def _is_kept(rules: Mapping[str, Rule], letter: Letter) -> bool:
-    return rules[letter.symbol].unoccludable
 
 
 def _units(direction: Direction, candidate: Candidate) -> list[float]:

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from .trees import Codes, Node, Trees, packed
 
-
 BATCH = 4096  # pixels
 
 
@@ -78,7 +77,8 @@ def dataset(
             self.rows = rows
 
         def __getitem__(self, index: Any) -> NDArray[np.float64]:
-            return self.rows[index].astype(np.float64)
+            floats: NDArray[np.float64] = self.rows[index].astype(np.float64)
+            return floats
 
         def __len__(self) -> int:
             return len(self.rows)

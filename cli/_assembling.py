@@ -29,7 +29,8 @@ from ._stream import ItemResult, open_sink, run_items, side_input
 NAME = "assemble"
 SIZE = re.compile(r"(\d+(?:\.\d+)?)[x×](\d+(?:\.\d+)?)")
 SIDE_LIMITS = (2.0, 1000.0)  # m
-RECORDED = ("side", "roof", "storey_height", "windows", "no_door", "metres")
+RECORDED = ("side", "roof", "storey_height", "windows", "no_door")
+CLASSES = "ecp"
 PITCH = 35.0  # degrees of a roof whose pitch nobody says
 
 Item = RawItem | str  # of a stream of artifacts, or the path of a label map
@@ -79,9 +80,7 @@ def run_assemble(stream: StreamOptions, values: Mapping[str, Any]) -> None:
         raise click.UsageError("name parses, or sides with --front, --back, --left, --right")
     footprint = values["footprint"]
     measured = footprint if footprint and SIZE.fullmatch(footprint) else None
-    recorded = {key: values[key] for key in RECORDED} | {
-        "footprint": measured, "classes": Path(values["classes"]).name
-    }  # fmt: skip
+    recorded = {key: values[key] for key in RECORDED} | _told(values, measured)
     stage = Assemble(
         Assembly(
             None if footprint is None else _ground(footprint, values["metres"]),
@@ -101,6 +100,16 @@ def run_assemble(stream: StreamOptions, values: Mapping[str, Any]) -> None:
         return
     with open_sink(stream.output) as write:
         write(*stage.made({side: _only(path, stage.classes) for side, path in given.items()}))
+
+
+def _told(values: Mapping[str, Any], measured: str | None) -> dict[str, Any]:
+    """Return the options that are recorded only where they are given."""
+    classes = Path(values["classes"]).name
+    given = {
+        "footprint": measured, "metres": values["metres"],
+        "classes": None if classes == CLASSES else classes,
+    }  # fmt: skip
+    return {name: value for name, value in given.items() if value}
 
 
 def _items(paths: tuple[str, ...]) -> Iterator[Item]:

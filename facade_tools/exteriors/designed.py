@@ -31,8 +31,10 @@ def designed_pieces(
 
     A design is solved for the largest plane of general boxes of its side, all storeys together.
     Its elements count as known: a design is the user's word. Elements that would cross a storey
-    line, leave the wall or meet a roof are left out with a warning. Raises Infeasible where a
-    design has no layout of that size.
+    line, leave the wall or meet a roof are left out with a warning; a piece that so loses all that
+    the design has there is no designed one. The main door is in the front:
+    one of another side's design is a plain door. Raises Infeasible where a design has no layout of
+    that size.
     """
     kinds = {box.id: box.kind for box in building.boxes}
     found: dict[str, tuple[Element, ...]] = {}
@@ -41,14 +43,16 @@ def designed_pieces(
         if not own:
             continue
         spots, size = _largest_plane(side, own)
-        elements = designer(*size)
+        elements = [replace(e, main=e.main and side == "front") for e in designer(*size)]
         lost = len(elements)
         for u, v, piece in spots:
             inside = _inside(elements, (u, v), piece)
             rows = overlaps(element_rectangles(inside), blocked[piece.id])
             hits = np.asarray(rows.any(axis=1))
-            found[piece.id] = tuple(e for e, hit in zip(inside, hits, strict=True) if not hit)
-            lost -= len(found[piece.id])
+            placed = tuple(e for e, hit in zip(inside, hits, strict=True) if not hit)
+            lost -= len(placed)
+            if placed or not _touched(elements, (u, v), piece):
+                found[piece.id] = placed
         if lost:
             log.warning("%s: %d elements of the %s design have no place", building.id, lost, side)
     if "front" in designers:
@@ -81,6 +85,12 @@ def _inside(elements: Sequence[Element], at: tuple[float, float], piece: Piece) 
         and e.u + e.width <= piece.width + NEAR
         and e.v + e.height <= piece.height + NEAR
     ]
+
+
+def _touched(elements: Sequence[Element], at: tuple[float, float], piece: Piece) -> bool:
+    """Tell whether an element reaches into a piece."""
+    whole = np.array([(*at, at[0] + piece.width, at[1] + piece.height)])
+    return bool(overlaps(element_rectangles(elements), whole).any())
 
 
 def _name_main_door(pieces: Sequence[Piece], found: dict[str, tuple[Element, ...]]) -> None:

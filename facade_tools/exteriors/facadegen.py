@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -23,9 +24,11 @@ from .facade_parts import Codes, MainDoor, PartRow, fitting_door, main_doors, pa
 from .facade_site import Solution, facade_of, search_side_of, storey_heads, with_door
 from .garage_doors import garage_doors, garage_sizes
 from .genetic import Search, search_side
-from .kept import Standing, standing_sides
+from .kept import Standing, refuse_contradictions, standing_sides
 from .library import ElementLibrary, default_library
 from .palette import house_colors
+
+log = logging.getLogger("facade_tools.facadegen")
 
 SIMILAR = 3  # buildings that may lend their elements, in random order
 TRIES = 3  # walls in which the main door is tried where the first does not do
@@ -62,9 +65,11 @@ def generate_facades(
     Targets come from `building.targets`; where it has none, from the most similar building of
     the library. Elements of `options.keep` stay to the millimetre and nothing is added to the
     sides that it lists. Several candidates get `-1`, `-2`, … after the building's id. Raises
-    InvalidInput on a partial building, Infeasible where a kept element has no wall.
+    InvalidInput on a partial building and on a side both kept and designed, Infeasible where a kept
+    element has no wall.
     """
     _refuse_unfinished(building)
+    _refuse_designed(options)
     shelf = options.library or default_library()
     pieces = facade_pieces(building)
     blocked = blocked_walls(building, pieces)
@@ -78,7 +83,15 @@ def generate_facades(
             similar = [shelf.observed(entry, options.keep) for entry in similar]
         walls = _Walls(pieces, blocked, designed)
         tries = (_Attempt(building, walls, shelf, entry, options, own) for entry in similar)
-        yield replace(_first_good(attempt.finished(wanted) for attempt in tries), id=identity)
+        done = replace(_first_good(attempt.finished(wanted) for attempt in tries), id=identity)
+        if not _has_main_door(done):
+            log.warning("%s: no main door: no wall of the front is left that takes one", identity)
+        yield done
+
+
+def _has_main_door(building: Building) -> bool:
+    pieces = [piece for facade in building.facades.values() for piece in facade.pieces]
+    return any(e.main for piece in pieces for e in piece.elements)
 
 
 def _first_good(attempts: Iterable[tuple[Building, float]]) -> Building:
@@ -99,6 +112,15 @@ def _refuse_unfinished(building: Building) -> None:
         raise InvalidInput(message, pointer="/partial")
     if all(box.kind == "porch" for box in building.boxes):
         raise InvalidInput("no general or garage box; expected at least one", pointer="/boxes")
+
+
+def _refuse_designed(options: FacadeOptions) -> None:
+    for side in options.keep.facades if options.keep else ():
+        if side in options.designs:
+            message = (
+                f"the {side} was observed (keep) and cannot be designed; expected another side"
+            )
+            raise InvalidInput(message)
 
 
 def _known(building: Building, keep: Building | None) -> Attributes:
@@ -172,7 +194,8 @@ class _Attempt:
             _with_elements(side, self.walls.designed)
             for side in standing_sides(self.building, made, keep)
         ]
-        free = {side.name: side.pieces for side in sides if not side.closed}
+        refuse_contradictions(sides)
+        free = {s.name: [p for p in s.pieces if p.id not in s.closed] for s in sides}
         room = {
             name: _area(pieces, ratio) - (name == "front") * MAIN_DOOR_AREA
             for (name, pieces), ratio in zip(made.items(), wanted.wwr, strict=True)

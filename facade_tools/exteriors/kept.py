@@ -31,7 +31,7 @@ def standing_sides(
 
     Known are all elements of `keep` (whose listed sides are closed: they were seen as a whole),
     and those that `building` itself marks as known; of one that both have, that of `keep`. Raises
-    Infeasible where one has no wall, two overlap, or two are main doors.
+    Infeasible where one has no wall.
     """
     sources = [building] if keep is None else [building, keep]
     closed = () if keep is None else tuple(keep.facades)
@@ -43,7 +43,6 @@ def standing_sides(
         placed = tuple(replace(piece, elements=tuple(own[piece.id])) for piece in pieces[side])
         full = frozenset(piece.id for piece in placed) if side in closed else frozenset()
         sides.append(Standing(side, placed, full))
-    _refuse_contradictions(sides)
     return sides
 
 
@@ -54,7 +53,7 @@ def check_kept(keep: Building) -> None:
             raise InvalidInput(problem.message, pointer=problem.pointer)
 
 
-def _refuse_contradictions(sides: Sequence[Standing]) -> None:
+def refuse_contradictions(sides: Sequence[Standing]) -> None:
     """Raise Infeasible where two known elements overlap, or there are two main doors."""
     mains = []
     for side in sides:

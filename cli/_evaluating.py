@@ -55,7 +55,7 @@ def _table(layout: Layout, stream: StreamOptions, faults: Faults) -> Readings:
         within,
     )
 
-    table = read_table(read_tables(stream), faults, needed=columns_of(layout))
+    table = read_table(read_tables(stream), columns_of(layout), faults, needed=True)
     table = within(table, layout_limits(layout), faults)
     readings = readings_of(table, layout)
     empty = nothing_observed(readings)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,7 +24,10 @@ from ._stream import Faults, is_folder, one_by_one, open_sink, write_result
 if TYPE_CHECKING:
     from facade_tools.artifacts.attributes import Attributes
     from facade_tools.artifacts.model import Model
+    from facade_tools.exteriors.holdout import BuildingRows
+    from facade_tools.exteriors.holdout import Rows as LearningRows
     from facade_tools.exteriors.sample_lines import Lines
+    from facade_tools.exteriors.table import TableRows
 
 RUN = 4096  # samples that one generator draws
 
@@ -218,35 +221,60 @@ def run_learn(
     groups: str | None,
 ) -> None:
     """Learn, compare and report as asked for, and write the model."""
-    from facade_tools.exteriors.learning import LearnOptions, learn_model
-    from facade_tools.exteriors.table import learn_table
+    from facade_tools.exteriors.learning import LearnOptions
     from facade_tools.randomness import item_generator
 
+    check_inputs(stream.inputs, prior, groups)
     check_outputs(stream.output, report)
     recorded = {"variant": variant, "faithful": faithful, "restarts": restarts}
     seed = stream.seed or 0
-    rng = item_generator(seed, "learn")
     faults = Faults("learn", stream.on_error)
+    options = LearnOptions(variant, faithful, restarts)
+    rows: LearningRows
     if groups is not None:
-        options = LearnOptions(variant=variant, faithful=faithful, restarts=restarts)
-        items = read_tables(stream)
-        model = learn_table(items, groups, rng=rng, options=options, refuse=faults)
-        sources = (*map(table_source, items), digest(groups))
-        rows: list[Attributes] = []
+        rows, sources = table_to_learn(stream, groups, faults)
     else:
-        read = read_attributes(stream, faults)
-        more = read_attributes(replace(stream, inputs=(prior,)), faults) if prior else None
-        rows, sources = read.attributes, read.sources + (more.sources if more else ())
-        options = LearnOptions(
-            variant, faithful, restarts, prior_rows=more.attributes if more else None
-        )
-        model = learn_model(rows, rng=rng, options=options)
-    table = compare(rows, options, holdout, seed) if holdout and rows else ()
+        rows, sources = buildings_to_learn(stream, faults)
+    if prior is not None:
+        more, origin = buildings_to_learn(replace(stream, inputs=(prior,)), faults)
+        options = replace(options, prior_rows=more.attributes)
+        sources += origin
+    model = rows.learn(range(len(rows)), options, rng=item_generator(seed, "learn"))
+    table = compare(rows, options, holdout, seed) if holdout else ()
     if report is not None:
         write_report(model, rows, table, report, seed)
     provenance = Provenance("learn", seed, recorded, sources)
     write_result(replace(model, provenance=provenance), stream.output)
     faults.complain()
+
+
+def buildings_to_learn(
+    stream: StreamOptions, faults: Faults
+) -> tuple[BuildingRows, tuple[Source, ...]]:
+    """Return buildings or attributes as rows to learn from, and their provenance."""
+    from facade_tools.exteriors.holdout import BuildingRows
+
+    read = read_attributes(stream, faults)
+    return BuildingRows(read.attributes), read.sources
+
+
+def table_to_learn(
+    stream: StreamOptions, groups: str, faults: Faults
+) -> tuple[TableRows, tuple[Source, ...]]:
+    """Return tables as rows to learn from, and their provenance."""
+    from facade_tools.exteriors.table import table_rows
+
+    items = read_tables(stream)
+    return table_rows(items, groups, faults), (*map(table_source, items), digest(groups))
+
+
+def check_inputs(inputs: Sequence[str], prior: str | None, groups: str | None) -> None:
+    """Raise UsageError on a table without groups, and on groups with a prior of buildings."""
+    tables = [path for path in inputs if path.lower().endswith(".csv")]
+    if groups is None and tables:
+        raise click.UsageError(f"{tables[0]}: a table needs --groups, which columns form groups")
+    if groups is not None and prior is not None:
+        raise click.UsageError("--prior is of buildings; a table (--groups) has none")
 
 
 def check_outputs(output: str | None, report: str | None) -> None:
@@ -260,7 +288,7 @@ def check_outputs(output: str | None, report: str | None) -> None:
         check_target(path)
 
 
-def compare(rows: list[Attributes], options: Any, splits: int, seed: int) -> Any:
+def compare(rows: LearningRows, options: Any, splits: int, seed: int) -> Any:
     """Print the held-out table of all variants on standard error and return it."""
     from facade_tools.exteriors.holdout import compare_variants, table_lines, training_curve
 
@@ -272,11 +300,13 @@ def compare(rows: list[Attributes], options: Any, splits: int, seed: int) -> Any
     return table
 
 
-def write_report(model: Model, rows: list[Attributes], table: Any, path: str, seed: int) -> None:
-    """Write the HTML report of a model, with two buildings of each style."""
+def write_report(model: Model, rows: LearningRows, table: Any, path: str, seed: int) -> None:
+    """Write the HTML report of a model; of buildings, with two of each style."""
     from facade_tools.exteriors.report import report_page
+    from facade_tools.exteriors.serialisation import network_of
     from facade_tools.exteriors.style_pictures import style_pictures
 
-    pictures = list(style_pictures(model, seed=seed)) if rows else []
-    page = report_page(model, rows, table, seed=seed, pictures=pictures)
+    layout = network_of(model).layout
+    pictures = [] if layout.is_table else list(style_pictures(model, seed=seed))
+    page = report_page(model, rows.under(layout), table, seed=seed, pictures=pictures)
     write_bytes(Path(path), page.encode())

@@ -18,7 +18,7 @@ from facade_tools.exteriors.coordinates import Readings, read_attributes
 from facade_tools.exteriors.dataset import build, fit_scaling
 from facade_tools.exteriors.em import Prior, Statistics, Stop, run, unit_weights
 from facade_tools.exteriors.evaluation import negative_log_density
-from facade_tools.exteriors.holdout import compare_variants, splits, training_curve
+from facade_tools.exteriors.holdout import BuildingRows, compare_variants, splits, training_curve
 from facade_tools.exteriors.layout import building_layout
 from facade_tools.exteriors.learning import LearnOptions, learn_model, learn_readings
 from facade_tools.exteriors.network import Family, Network, Pooled, infer
@@ -318,7 +318,9 @@ def test_splits_are_disjoint_and_repeat():
 
 def test_comparison_pairs_the_same_rows(houses):
     options = LearnOptions(largest=2)
-    table = compare_variants(houses[::6], 1, options=options, variants=("no-lateral", "flat"))
+    table = compare_variants(
+        BuildingRows(houses[::6]), 1, options=options, variants=("no-lateral", "flat")
+    )
     assert [row.variant for row in table] == ["no-lateral", "flat"]
     assert table[0].difference == 0.0
     assert table[0].rows == table[1].rows == 10
@@ -326,7 +328,7 @@ def test_comparison_pairs_the_same_rows(houses):
 
 def test_training_curve_uses_more_and_more_rows(houses):
     options = LearnOptions("no-lateral", largest=2)
-    curve = training_curve(houses[::4], options=options, shares=(0.5, 1.0))
+    curve = training_curve(BuildingRows(houses[::4]), options=options, shares=(0.5, 1.0))
     assert [rows for rows, _ in curve] == [29, 58]
     assert np.isfinite([nll for _, nll in curve]).all()
 

@@ -11,10 +11,13 @@ import pytest
 
 from facade_tools.artifacts.store import read_whole
 from facade_tools.errors import InvalidInput
+from facade_tools.exteriors.drawing import SampleOptions
 from facade_tools.exteriors.learning import LearnOptions
+from facade_tools.exteriors.sample_lines import sample_lines
 from facade_tools.exteriors.table import learn_table
 
 PLAIN = "a,b\n1,2\n3,4\n5,6\n2,2\n1,1\n"
+PLAIN_DRAW = {"options": SampleOptions(), "given": None, "provenance": None}
 GROUPS = "groups: {one: [a], two: [b]}\n"
 
 
@@ -40,6 +43,7 @@ def learned(folder, table=PLAIN, groups=GROUPS, **options):
         ("a,b\n1,1\n2,x\n", 3, "'x' in column 'b'"),
         ("a,b,id\n1,2,x\n3,4,y\n1,5,x\n", 4, "'x' stands twice"),
         ("a,a\n1,2\n", 1, "'a' stands twice"),
+        ("id,a,b,id\n1,2,3,4\n", 1, "'id' stands twice"),
         ("a,b\n", None, "expected at least 2"),
         ("", None, "is empty"),
     ],
@@ -94,8 +98,58 @@ def test_a_value_that_a_column_cannot_hold_is_refused_by_its_line(tmp_path, grou
     assert error.value.place.line == line
 
 
-def test_a_column_that_nobody_observes_learns(tmp_path):
-    assert learned(tmp_path, "a,b\n1,\n3,\n4,\n").count == 3
+@pytest.mark.parametrize("variant", ["full", "gmm"])
+def test_what_nobody_observes_stays_unknown(tmp_path, variant):
+    groups = GROUPS + "bits: {flags: [f, g]}\n"
+    table = "a,b,f,g\n1,,1,\n3,,0,\n4,,1,\n"
+    model = learned(tmp_path, table, groups, variant=variant)
+    assert model.count == 3
+    assert model.unobserved == ("b", "flags.g")
+    lines = b"".join(
+        run.data for run in sample_lines(model, 2, rng=np.random.default_rng(0), **PLAIN_DRAW)
+    )
+    for line in lines.decode().splitlines():
+        name, a, b, f, g = line.split(",")
+        assert (name[:2], b, g) == ("0-", "", "")
+        assert float(a) and f in "01"
+
+
+def test_columns_of_no_group_and_blank_lines_do_not_matter(tmp_path):
+    table = "name,a,,,b\nAda,1,,x,2\n\nBo,3,y,,4\nAda,5,,,7\n\n"
+    model = learned(tmp_path, table)
+    assert model == learned(tmp_path, "a,b\n1,2\n3,4\n5,7\n")
+
+
+def test_the_columns_that_there_are_are_named(tmp_path):
+    with pytest.raises(InvalidInput, match="no column 'a'; expected one of 'a;b'"):
+        learned(tmp_path, "a;b\n1;2\n3;4\n")
+
+
+def test_holdout_and_report_of_a_table(facade_here, folder):
+    words = ("learn", "table.csv", "--groups", "groups.yaml", "--holdout", 1)
+    done = facade_here(*words, "--report", "r.html", "-o", "m.json", cwd=folder)
+    assert done.returncode == 0
+    rows = [line.split() for line in done.stderr.decode().splitlines()]
+    assert [row[0] for row in rows[1:6]] == ["full", "no-lateral", "no-middle", "flat", "gmm"]
+    assert np.isfinite([float(row[1]) for row in rows[1:6]]).all()
+    page = (folder / "r.html").read_text()
+    for text in ("Model of 40 rows", "nats a row", "<figcaption>width</figcaption>"):
+        assert text in page
+    assert "building" not in page
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("learn", "table.csv"), b"table.csv: a table needs --groups"),
+        (("learn", "table.csv", "--groups", "groups.yaml", "--prior", "x"), b"--prior is of"),
+    ],
+)
+def test_options_that_do_not_suit_a_table_are_refused(facade_here, folder, words, message):
+    done = facade_here(*words, "-o", "never.json", cwd=folder)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert not (folder / "never.json").exists()
 
 
 @pytest.fixture(scope="module")

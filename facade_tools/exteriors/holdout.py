@@ -4,17 +4,61 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
 from ..artifacts.attributes import Attributes
+from ..artifacts.model import Model
 from ..randomness import item_generator
-from .coordinates import Floats
+from .coordinates import Floats, Readings, read_attributes
 from .evaluation import negative_log_density
+from .layout import Layout
 from .learning import LearnOptions, Variant, learn_model
 
 VARIANTS: tuple[Variant, ...] = ("full", "no-lateral", "no-middle", "flat", "gmm")
 TEST_SHARE = 0.2
+
+
+class Rows(Protocol):
+    """Rows that a model can be learned from and that it can foresee: of buildings, of a table."""
+
+    def __len__(self) -> int: ...
+
+    def learn(
+        self, rows: Sequence[int], options: LearnOptions, *, rng: np.random.Generator
+    ) -> Model:
+        """Return the model of some of the rows."""
+
+    def foresee(self, model: Model, rows: Sequence[int]) -> Floats:
+        """Return the negative log density (n,) of some of the rows, nats."""
+
+    def under(self, layout: Layout) -> Readings:
+        """Return all rows as a layout sees them."""
+
+
+@dataclass(frozen=True, slots=True)
+class BuildingRows:
+    """The attribute vectors of buildings."""
+
+    attributes: Sequence[Attributes]
+
+    def __len__(self) -> int:
+        return len(self.attributes)
+
+    def learn(
+        self, rows: Sequence[int], options: LearnOptions, *, rng: np.random.Generator
+    ) -> Model:
+        """Return the model of some of the buildings."""
+        return learn_model([self.attributes[i] for i in rows], rng=rng, options=options)
+
+    def foresee(self, model: Model, rows: Sequence[int]) -> Floats:
+        """Return the negative log density (n,) of some of the buildings, nats."""
+        return negative_log_density(model, [self.attributes[i] for i in rows])
+
+    def under(self, layout: Layout) -> Readings:
+        """Return all buildings as a layout sees them."""
+        return read_attributes(self.attributes, layout)
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +82,7 @@ def splits(count: int, repeats: int, seed: int) -> Iterator[tuple[list[int], lis
 
 
 def compare_variants(
-    rows: Sequence[Attributes],
+    rows: Rows,
     repeats: int,
     *,
     seed: int = 0,
@@ -51,14 +95,14 @@ def compare_variants(
         for variant in variants:
             rng = item_generator(seed, "holdout", variant)
             chosen = replace(options or LearnOptions(), variant=variant)
-            model = learn_model([rows[i] for i in train], rng=rng, options=chosen)
-            found[variant].append(negative_log_density(model, [rows[i] for i in test]))
+            model = rows.learn(train, chosen, rng=rng)
+            found[variant].append(rows.foresee(model, test))
     first = np.concatenate(found[variants[0]])
     return tuple(_compared(v, np.concatenate(found[v]), first) for v in variants)
 
 
 def training_curve(
-    rows: Sequence[Attributes],
+    rows: Rows,
     *,
     seed: int = 0,
     options: LearnOptions | None = None,
@@ -66,13 +110,12 @@ def training_curve(
 ) -> tuple[tuple[int, float], ...]:
     """Return training rows and held-out mean NLL for growing parts of the first split's 80%."""
     train, test = next(splits(len(rows), 1, seed))
-    held = [rows[i] for i in test]
     out = []
     for share in shares:
-        part = [rows[i] for i in train[: max(2, round(share * len(train)))]]
+        part = train[: max(2, round(share * len(train)))]
         rng = item_generator(seed, "curve", len(part))
-        model = learn_model(part, rng=rng, options=options or LearnOptions())
-        out.append((len(part), float(negative_log_density(model, held).mean())))
+        model = rows.learn(part, options or LearnOptions(), rng=rng)
+        out.append((len(part), float(rows.foresee(model, test).mean())))
     return tuple(out)
 
 

@@ -66,7 +66,7 @@ def learn_model(
 ) -> Model:
     """Return the model learned from at least two attribute vectors.
 
-    Raises InvalidInput where there are fewer, or where one observes nothing.
+    Raises InvalidInput where there are fewer.
     """
     if len(attributes) < 2:
         raise InvalidInput(f"{len(attributes)} buildings to learn from; expected at least 2")
@@ -79,10 +79,15 @@ def learn_model(
 def learn_readings(
     readings: Readings, layout: Layout, *, rng: np.random.Generator, options: LearnOptions
 ) -> Model:
-    """Return the model of rows that are no buildings: what nobody observes stays unknown."""
+    """Return the model of rows that are no buildings: what nobody observes stays unknown.
+
+    `unobserved` lists that.
+    """
     if len(readings) < 2:
         raise InvalidInput(f"{len(readings)} rows to learn from; expected at least 2")
-    problem = problem_of(readings, layout, 0, (), [[] for _ in layout.groups])
+    missing = unobserved_coordinates(readings, layout)
+    names = (*(name for group in missing for name in group), *unobserved_bits(readings, layout))
+    problem = problem_of(readings, layout, 0, names, [[] for _ in layout.groups])
     fit, tried = fit_variant(problem, options, rng)
     return to_model(problem, fit, tried, options, 1.0, rng)
 

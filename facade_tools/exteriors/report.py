@@ -12,7 +12,7 @@ import numpy as np
 from ..artifacts.attributes import Attributes
 from ..artifacts.model import Model
 from ..randomness import item_generator
-from .coordinates import Floats, Readings, read_attributes
+from .coordinates import Floats, Readings
 from .holdout import Comparison
 from .layout import Layout
 from .sampling import draw_block
@@ -31,13 +31,13 @@ BINS = 24
 
 def report_page(
     model: Model,
-    rows: Sequence[Attributes],
+    rows: Readings,
     comparison: Sequence[Comparison],
     *,
     seed: int = 0,
     pictures: Iterable[StylePicture] = (),
 ) -> str:
-    """Return the HTML page of a model learned from `rows` (none: of a table).
+    """Return the HTML page of a model learned from `rows`.
 
     Cardinalities, lateral edges, score trace, samples of each style (`pictures`; a sample without
     a picture is drawn as a glyph), marginals of data and samples, and the held-out table where
@@ -48,20 +48,21 @@ def report_page(
         "<h2>Lateral edges</h2>" + figure(edge_graph(model), f"{len(model.edges)} edges"),
         "<h2>Score</h2>" + figure(trace_graph(model.trace), score_caption(model)),
     )
-    prior = escape(", ".join(model.unobserved)) or "nothing"
+    is_table = network_of(model).layout.is_table
+    noun = "row" if is_table else "building"
+    source = "so unknown to the samples" if is_table else "taken from the prior"
+    unobserved = escape(", ".join(model.unobserved)) or "nothing"
     parts = [
-        f"<h1>Model of {model.count} buildings ({escape(model.variant)})</h1>",
+        f"<h1>Model of {model.count} {noun}s ({escape(model.variant)})</h1>",
         f"<div class='columns'>{''.join(f'<div>{column}</div>' for column in columns)}</div>",
-        f"<p>Not observed by any building, taken from the prior: {prior}.</p>",
+        f"<p>Not observed by any {noun}, {source}: {unobserved}.</p>",
     ]
     if comparison:
-        parts.append("<h2>Held-out negative log-likelihood (nats a building)</h2>")
+        parts.append(f"<h2>Held-out negative log-likelihood (nats a {noun})</h2>")
         parts.append(held_out(comparison))
-    if rows:
-        parts.append("<h2>Samples of each style</h2>" + "".join(style_figures(model, pictures)))
-        parts.append(
-            "<h2>Data (blue) and samples (red)</h2>" + "".join(marginals(model, rows, seed))
-        )
+    if figures := "".join(style_figures(model, pictures)):
+        parts.append(f"<h2>Samples of each style</h2>{figures}")
+    parts.append("<h2>Data (blue) and samples (red)</h2>" + "".join(marginals(model, rows, seed)))
     body = "\n".join(parts)
     head = f"<meta charset='utf-8'><title>facade learn</title><style>{STYLE}</style>"
     return f"<!doctype html><html lang='en'><head>{head}</head><body>\n{body}\n</body></html>\n"
@@ -193,10 +194,9 @@ def glyph(a: Attributes) -> str:
     return svg(120, 190, out)
 
 
-def marginals(model: Model, rows: Sequence[Attributes], seed: int) -> Iterator[str]:
+def marginals(model: Model, data: Readings, seed: int) -> Iterator[str]:
     """Yield one histogram a coordinate, data and samples overlaid, atoms at their own values."""
     network = network_of(model)
-    data = read_attributes(rows, network.layout)
     rng, shared = item_generator(seed, "report"), shared_values(model, network)
     drawn = draw_block(network, rng=rng, shared=shared).readings
     for name, ours, theirs in _columns(network.layout, data, drawn):

@@ -15,10 +15,12 @@ import numpy as np
 from ..artifacts.model import Model
 from ..artifacts.store import RawItem
 from ..errors import InvalidInput, Place
-from .coordinates import Bits, Floats, Readings
+from .coordinates import Bits, Floats, Readings, join
+from .evaluation import row_log_density
 from .groups import ATOM_TOLERANCE, BitGroup, Coordinate
 from .layout import UNBOUNDED, GroupLayout, Layout, atom_channel, merged
 from .learning import LearnOptions, learn_readings
+from .serialisation import network_of
 from .table_groups import ID, ColumnGroup, Declaration, read_declaration
 from .transforms import EDGE, TRANSFORMS
 
@@ -29,18 +31,22 @@ Refuse = Callable[[InvalidInput], None]
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Rows with their ids and places, and columns (n,) by name, NaN where a cell is empty."""
+    """Rows with their ids and places, and columns (n,) by name, NaN where a cell is empty.
+
+    header: the names of all columns of the file, also of those that were not read.
+    """
 
     ids: tuple[str, ...]
     places: tuple[Place, ...]
     columns: Mapping[str, Floats]
+    header: tuple[str, ...]
 
     def take(self, rows: Sequence[int]) -> Table:
         """Return some of the rows."""
         index = np.array(rows, dtype=np.int64)
         columns = {name: column[index] for name, column in self.columns.items()}
         ids, places = tuple(self.ids[i] for i in rows), tuple(self.places[i] for i in rows)
-        return Table(ids, places, columns)
+        return Table(ids, places, columns, self.header)
 
 
 class Limit(NamedTuple):
@@ -58,42 +64,79 @@ def stop(error: InvalidInput) -> None:
     raise error
 
 
-def learn_table(
-    items: Sequence[RawItem],
-    groups: str,
-    *,
-    rng: np.random.Generator,
-    options: LearnOptions,
-    refuse: Refuse = stop,
-) -> Model:
-    """Return the model of a table (CSV with a header; empty cells are unobserved).
+@dataclass(frozen=True, slots=True)
+class TableRows:
+    """The rows of a table to learn from: layout, readings, and the (first) file they come from."""
 
-    refuse: takes the errors of single rows; where it returns, the row is left out.
+    layout: Layout
+    readings: Readings
+    source: str
+
+    def __len__(self) -> int:
+        return len(self.readings)
+
+    def learn(
+        self, rows: Sequence[int], options: LearnOptions, *, rng: np.random.Generator
+    ) -> Model:
+        """Return the model of some of the rows."""
+        layout = merged(self.layout) if options.variant == "gmm" else self.layout
+        readings = self.under(layout).take(np.array(rows, dtype=np.int64))
+        try:
+            return learn_readings(readings, layout, rng=rng, options=options)
+        except InvalidInput as error:
+            raise error.at(self.source) from None
+
+    def foresee(self, model: Model, rows: Sequence[int]) -> Floats:
+        """Return the negative log density (n,) of some of the rows, nats."""
+        network = network_of(model)
+        readings = self.under(network.layout).take(np.array(rows, dtype=np.int64))
+        return -row_log_density(network, readings)
+
+    def under(self, layout: Layout) -> Readings:
+        """Return the readings as a layout of these columns has them: merged or by group."""
+        return (
+            self.readings if len(layout.groups) == len(self.layout.groups) else join(self.readings)
+        )
+
+
+def table_rows(items: Sequence[RawItem], groups: str, refuse: Refuse = stop) -> TableRows:
+    """Return the rows of a table (CSV with a header; empty cells are unobserved).
+
+    groups: path of the declaration. refuse: takes the errors of single rows; where it returns, the
+    row is left out.
     """
     declaration = read_declaration(groups)
-    table = read_table(items, refuse)
+    table = read_table(items, declaration.columns, refuse)
     try:
         limits = declared_limits(table, declaration)
         layout, readings = table_readings(within(table, limits, refuse), declaration)
     except InvalidInput as error:
         raise error.at(groups) from None
-    if options.variant == "gmm":
-        layout, readings = merged(layout), _joined(readings)
-    try:
-        return learn_readings(readings, layout, rng=rng, options=options)
-    except InvalidInput as error:
-        raise error.at(items[0].source) from None
+    return TableRows(layout, readings, items[0].source)
+
+
+def learn_table(
+    items: Sequence[RawItem], groups: str, *, rng: np.random.Generator, options: LearnOptions
+) -> Model:
+    """Return the model of a table, as `table_rows` reads it."""
+    rows = table_rows(items, groups)
+    return rows.learn(range(len(rows)), options, rng=rng)
 
 
 # --- the rows -----------------------------------------------------------------------------------
 
 
 def read_table(
-    items: Sequence[RawItem], refuse: Refuse = stop, *, needed: Sequence[str] = ()
+    items: Sequence[RawItem],
+    columns: Sequence[str],
+    refuse: Refuse = stop,
+    *,
+    needed: bool = False,
 ) -> Table:
-    """Return the rows of CSV files with the same header; bad ones go to `refuse`.
+    """Return rows and `columns` of CSV files with the same header; bad rows go to `refuse`.
 
-    Raises InvalidInput where the header lacks a column that is `needed`.
+    What other columns hold does not matter. Raises InvalidInput where the header lacks one of
+    `columns` and all are `needed`.
     """
     ids: list[str] = []
     rows: list[list[float]] = []
@@ -106,27 +149,29 @@ def read_table(
         if first is None or (header is not None and first != header):
             message = "has no header, or another than the first file"
             raise InvalidInput(message).at(item.source)
-        header = _header(first, needed, item.source)
+        header = _header(first, columns, item.source, needed=needed)
         for count, (line, cells) in enumerate(lines, start=2):
             try:
-                row = _numbers(cells, header)
+                row = _numbers(cells, header, columns)
                 ids.append(_identity(cells, header, seen) if ID in header else str(count))
             except InvalidInput as error:
                 refuse(error.at(item.source, line))
                 continue
             rows.append(row)
             places.append(Place(item.source, line))
-    names = header or []
+    names = [name for name in header or [] if name in columns]
     table = np.array(rows, dtype=np.float64).reshape(len(rows), len(names))
-    return Table(tuple(ids), tuple(places), {name: table[:, i] for i, name in enumerate(names)})
+    read = {name: table[:, i] for i, name in enumerate(names)}
+    return Table(tuple(ids), tuple(places), read, tuple(header or ()))
 
 
 def _lines(item: RawItem) -> Iterator[tuple[int, list[str]]]:
-    """Yield the records of a file, each with the line on which it ends."""
+    """Yield the records of a file, each with the line on which it ends; blank lines are none."""
     try:
         reader = csv.reader(io.StringIO(item.data.decode("utf-8-sig"), newline=""))
         for cells in reader:
-            yield reader.line_num, cells
+            if cells:
+                yield reader.line_num, cells
     except UnicodeDecodeError as error:
         message = f"not UTF-8 text (byte {error.start}); expected a CSV table"
         raise InvalidInput(message).at(item.source) from None
@@ -134,14 +179,13 @@ def _lines(item: RawItem) -> Iterator[tuple[int, list[str]]]:
         raise InvalidInput(f"no CSV: {error}").at(item.source, reader.line_num) from None
 
 
-def _header(cells: list[str], needed: Sequence[str], source: str) -> list[str]:
-    for name, count in Counter(cells).items():
-        if count > 1:
+def _header(cells: list[str], columns: Sequence[str], source: str, *, needed: bool) -> list[str]:
+    for name in (ID, *columns):
+        if cells.count(name) > 1:
             message = f"column {name!r} stands twice; expected unique names"
             raise InvalidInput(message).at(source, 1)
-    for name in needed:
-        if name not in cells:
-            message = f"has no column {name!r}; expected {', '.join(needed)}"
+        if needed and name != ID and name not in cells:
+            message = f"has no column {name!r}; expected {', '.join(columns)}"
             raise InvalidInput(message).at(source, 1)
     return cells
 
@@ -154,14 +198,15 @@ def _identity(cells: list[str], header: list[str], seen: set[str]) -> str:
     return identity
 
 
-def _numbers(cells: list[str], header: list[str]) -> list[float]:
+def _numbers(cells: list[str], header: list[str], columns: Sequence[str]) -> list[float]:
     if len(cells) != len(header):
         raise InvalidInput(f"{len(cells)} cells; expected {len(header)}")
-    return [_number(cell, name) for name, cell in zip(header, cells, strict=True)]
+    rows = zip(header, cells, strict=True)
+    return [_number(cell, name) for name, cell in rows if name in columns]
 
 
 def _number(cell: str, column: str) -> float:
-    if column == ID or not cell.strip():
+    if not cell.strip():
         return np.nan
     try:
         value = float(cell)
@@ -219,7 +264,9 @@ def bit_limit(name: str) -> Limit:
 
 def _present(table: Table, name: str, pointer: str) -> None:
     if name not in table.columns:
-        raise InvalidInput(f"the table has no column {name!r}", pointer=pointer)
+        names = ", ".join(map(repr, table.header))
+        message = f"the table has no column {name!r}; expected one of {names}"
+        raise InvalidInput(message, pointer=pointer)
 
 
 def within(table: Table, limits: Sequence[Limit], refuse: Refuse = stop) -> Table:
@@ -297,8 +344,3 @@ def _spread(table: Floats) -> Floats:
 
 def _bits(column: Floats) -> Bits:
     return np.where(np.isnan(column), -1, column).astype(np.int8)
-
-
-def _joined(readings: Readings) -> Readings:
-    values = np.concatenate(readings.values, axis=1)
-    return Readings(readings.ids, (values,), (readings.parts[0],), readings.bits)

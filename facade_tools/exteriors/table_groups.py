@@ -38,6 +38,12 @@ class Declaration:
     groups: Mapping[str, ColumnGroup]
     bits: Mapping[str, tuple[str, ...]]
 
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """All columns that it names: of numbers, then of bits."""
+        numbers = [name for group in self.groups.values() for name in group.columns]
+        return (*numbers, *(name for names in self.bits.values() for name in names))
+
 
 def read_declaration(path: str) -> Declaration:
     """Return groups.yaml. Raises InvalidInput with the pointer of what is wrong."""

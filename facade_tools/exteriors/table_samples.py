@@ -25,11 +25,15 @@ def table_rows(source: Source, block: Block, first: int) -> bytes:
 
 
 def _rows(source: Source, block: Block, first: int) -> Iterator[tuple[Any, ...]]:
+    layout = source.network.layout
+    names = [*(c.name for group in layout.groups for c in group.coordinates), *layout.bits]
+    unknown = [name in source.model.unobserved for name in names]
     groups = [values.tolist() for values in block.readings.values]
     bits = block.readings.bits.tolist()
     for i, name in enumerate(block_ids(source, block, first)):
         numbers = [number for group in groups for number in group[i]]
-        yield (name, *canonical(numbers), *bits[i])
+        cells = zip((*canonical(numbers), *bits[i]), unknown, strict=True)
+        yield (name, *("" if nobody_knows else cell for cell, nobody_knows in cells))
 
 
 def _written(rows: Iterable[tuple[Any, ...]]) -> bytes:

@@ -156,6 +156,15 @@ def _swap(document):
         ),
         (lambda d: d["groups"][5]["coordinates"][0].pop("part"), "/groups/5/coordinates/0/part"),
         (_swap, "/groups/2/name"),
+        (lambda d: d["groups"][3]["channels"].pop(), "/groups/3/channels"),
+        (
+            lambda d: d["groups"][3]["channels"][0].update(states=["value", "none", "all"]),
+            "/groups/3/channels/0/states/1",
+        ),
+        (
+            lambda d: d["groups"][3]["coordinates"][0].update(atoms=[0.5, 0.75]),
+            "/groups/3/coordinates/0/atoms",
+        ),
         (lambda d: d["elements"].pop(0), "/elements/0/name"),
         (lambda d: d["elements"][0]["bits"].__setitem__(0, "tent"), "/elements/0/bits/0"),
         (lambda d: d.update(boundary="bdry"), "/groups/2/coordinates/0/name"),

@@ -436,7 +436,7 @@ def door_design(width: float, height: float) -> list[Element]:
 
 def test_main_door_is_in_the_front_where_other_sides_are_designed():
     mass = bare(sample("split_garage"))
-    (house,) = made(mass, designs={side: door_design for side in SIDES})
+    (house,) = made(mass, designs=dict.fromkeys(SIDES, door_design))
     assert list(building_problems(house)) == []
     assert [side for side, _, e in elements(house) if e.main] == ["front"]
     assert {side for side, _, e in elements(house) if e.kind == "door" and e.known} == set(SIDES)

@@ -11,6 +11,7 @@ import pytest
 from learned_tables import as_readings, table_layout
 from scipy.special import gammaln
 
+from facade_tools.artifacts.attributes import FacadeAttributes
 from facade_tools.artifacts.store import read_whole
 from facade_tools.errors import InvalidInput
 from facade_tools.exteriors import em, mixture, styles
@@ -331,6 +332,19 @@ def test_training_curve_uses_more_and_more_rows(houses):
     curve = training_curve(BuildingRows(houses[::4]), options=options, shares=(0.5, 1.0))
     assert [rows for rows, _ in curve] == [29, 58]
     assert np.isfinite([nll for _, nll in curve]).all()
+
+
+def test_a_prior_without_what_is_unobserved_is_refused(houses):
+    rows = [replace(house, facade=FacadeAttributes()) for house in houses[:20]]
+
+    def learn(prior):
+        options = LearnOptions(largest=2, prior_rows=prior)
+        return learn_model(rows, rng=np.random.default_rng(0), options=options)
+
+    assert "wwr.front" in learn(houses[20:40]).unobserved
+    for prior in ([], rows):
+        with pytest.raises(InvalidInput, match=r"nor the prior observes wwr\.front"):
+            learn(prior)
 
 
 def test_a_table_of_any_kind(tmp_path):

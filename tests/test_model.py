@@ -209,6 +209,14 @@ def _broken(model, change):
             "/groups/1/channels/0/states",
         ),
         (lambda d: d["training"]["ids"].pop(), "/training/values"),
+        (
+            lambda d: d["groups"][0]["coordinates"][1].update(center=1e300),
+            "/groups/0/coordinates/1/center",
+        ),
+        (
+            lambda d: d["groups"][0]["coordinates"][0].update(scale=1e-300),
+            "/groups/0/coordinates/0/scale",
+        ),
     ],
 )
 def test_a_tampered_file_is_refused(model, change, pointer):

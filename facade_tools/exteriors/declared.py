@@ -11,7 +11,7 @@ from .layout import GroupLayout, Layout, building_layout, merged
 
 
 def check_declared(layout: Layout, groups: tuple[Group, ...] = GROUPS) -> None:
-    """Raise InvalidInput, with the pointer, where groups, coordinates, parts or bits differ."""
+    """Raise InvalidInput, with the pointer, where it is over anything else than declared."""
     declared = building_layout(layout.boundary, groups)
     if len(layout.groups) == 1:
         declared = merged(declared)
@@ -22,6 +22,11 @@ def check_declared(layout: Layout, groups: tuple[Group, ...] = GROUPS) -> None:
         expected = [c.name for c in wanted.coordinates]
         _same(names, expected, f"{pointer}/coordinates", "/name")
         _same(_parts(found), _parts(wanted), f"{pointer}/coordinates", "/part")
+        _same(_atoms(found), _atoms(wanted), f"{pointer}/coordinates", "/atoms")
+        names, expected = ([c.name for c in g.channels] for g in (found, wanted))
+        _same(names, expected, f"{pointer}/channels", "/name")
+        for c, (channel, other) in enumerate(zip(found.channels, wanted.channels, strict=True)):
+            _same(channel.states, other.states, f"{pointer}/channels/{c}/states", "")
     bits = declared.bit_groups
     _same([b.name for b in layout.bit_groups], [b.name for b in bits], "/elements", "/name")
     for i, (has, lacks) in enumerate(zip(layout.bit_groups, bits, strict=True)):
@@ -30,6 +35,10 @@ def check_declared(layout: Layout, groups: tuple[Group, ...] = GROUPS) -> None:
 
 def _parts(group: GroupLayout) -> list[str]:
     return [group.channels[i].name if i >= 0 else "null" for i in group.part]
+
+
+def _atoms(group: GroupLayout) -> list[str]:
+    return [", ".join(f"{atom:g}" for atom in c.atoms) for c in group.coordinates]
 
 
 def _same(found: Sequence[str], expected: Sequence[str], pointer: str, key: str) -> None:

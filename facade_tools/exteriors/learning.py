@@ -66,7 +66,7 @@ def learn_model(
 ) -> Model:
     """Return the model learned from at least two attribute vectors.
 
-    Raises InvalidInput where there are fewer.
+    Raises InvalidInput where there are fewer, or where the prior lacks what they lack.
     """
     if len(attributes) < 2:
         raise InvalidInput(f"{len(attributes)} buildings to learn from; expected at least 2")
@@ -113,7 +113,16 @@ def prepare(attributes: Sequence[Attributes], options: LearnOptions) -> Problem:
         more = read_attributes(prior, layout, options.groups)
         extra = len(more)
         readings = stack(readings, more)
+        _refuse_unknown(readings, layout)
     return problem_of(readings, layout, extra, names, missing)
+
+
+def _refuse_unknown(readings: Readings, layout: Layout) -> None:
+    names = [name for group in unobserved_coordinates(readings, layout) for name in group]
+    names += unobserved_bits(readings, layout)
+    if names:
+        message = f"neither what is learned from nor the prior observes {', '.join(names)}"
+        raise InvalidInput(f"{message}; expected a prior that does")
 
 
 def problem_of(

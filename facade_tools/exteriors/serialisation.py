@@ -17,8 +17,10 @@ from .dataset import Scaling
 from .groups import BitGroup, Coordinate
 from .layout import Channel, GroupLayout, Layout
 from .network import Family, Network, topological
+from .transforms import ENDS
 
 TOLERANCE = 1e-6
+SCALES = (1e-50, 1e50)  # beyond them squares of standardised numbers overflow
 DIGITS = 12  # of a number against its scale; those after them differ between processors
 
 
@@ -152,6 +154,7 @@ def _network(model: Model) -> Network:
     bits = [_unit(e.probabilities, f"/elements/{i}", len(style), len(e.bits))
             for i, e in enumerate(model.elements)]  # fmt: skip
     families = tuple(_family(g, i, layout, len(style)) for i, g in enumerate(model.groups))
+    _scales(model)
     try:
         topological(families, layout)
     except ValueError as error:
@@ -178,6 +181,21 @@ def _unique(names: Sequence[str], pointer: str) -> None:
     for name, count in Counter(names).items():
         if count > 1:
             raise InvalidInput(f"{name!r} stands twice; expected unique names", pointer=pointer)
+
+
+def _scales(model: Model) -> None:
+    """Raise InvalidInput where no numbers that a transform takes have such a centre or scale."""
+    for i, group in enumerate(model.groups):
+        for k, c in enumerate(group.coordinates):
+            low, high = ENDS[c.transform]
+            rows = (
+                ("center", c.center, low - TOLERANCE, high + TOLERANCE),
+                ("scale", c.scale, *SCALES),
+            )
+            for name, value, least, most in rows:
+                if not least <= value <= most:
+                    message = f"{value:g}; expected {least:g} to {most:g} ({c.transform})"
+                    raise InvalidInput(message, pointer=f"/groups/{i}/coordinates/{k}/{name}")
 
 
 def _training(model: Model, layout: Layout) -> None:

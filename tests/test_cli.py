@@ -244,6 +244,16 @@ def test_ids_cannot_leave_the_folder(facade, tmp_path):
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["_.._evil.json"]
 
 
+def test_skip_goes_on_after_an_id_that_stands_twice_in_a_folder(facade, tmp_path):
+    first, second = BUNGALOWS.read_text().splitlines()[:2]
+    stdin = "\n".join([first, first, second]).encode()
+    words = ("attributes", "-", "-o", f"{tmp_path}/out/")
+    done = facade(*words, "--on-error", "skip", stdin=stdin)
+    assert done.returncode == 3
+    assert b"stands twice" in done.stderr
+    assert len(list((tmp_path / "out").iterdir())) == 2
+
+
 def test_provenance_names_inputs_and_only_what_matters(facade):
     row = lines(facade("-v", "attributes", BUNGALOWS, "--on-error", "skip").stdout)[0]
     provenance = row["provenance"]

@@ -116,4 +116,5 @@ def test_both_take_metres(facade_here, picture):
     done = facade_here("parse-image", picture, "--height", 18)
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["tags"]["scale"] == "height"
+    assert "tags" not in json.loads(facade_here("parse-image", picture).stdout)
     assert facade_here("parse-image", picture, "--method", "forest", "--height", 18).returncode == 2

@@ -146,7 +146,7 @@ def read_facade(
         optimal=solution.optimal,
         trace=solution.trace,
         derivation=tree,
-        tags={} if other is None else other.parse.tags,
+        tags=_scale(other),
     )
     return Reading(parse, painted(tree, shape, label_index()), raw)
 
@@ -165,6 +165,13 @@ def _second_reading(
         return second(photo, identity, rng=rng, mask=mask)
     except Infeasible:
         return None
+
+
+def _scale(other: Reading | None) -> Mapping[str, object]:
+    """Return the scale that another reading was told. One that it guessed says less than floors."""
+    if other is None or other.parse.tags.get("scale") == "relative":
+        return {}
+    return other.parse.tags
 
 
 def raw_labels(

@@ -20,10 +20,16 @@ from facade_tools.artifacts.store import read
 from facade_tools.errors import Infeasible, InvalidInput
 from facade_tools.exteriors.attributes import building_attributes
 from facade_tools.exteriors.facade_energy import energy
+from facade_tools.exteriors.facade_layout import WIDE_WALL
 from facade_tools.exteriors.facade_sizing import sized
 from facade_tools.exteriors.facadegen import FacadeOptions, generate_facades
 from facade_tools.exteriors.genetic import Search
-from facade_tools.exteriors.library import build_library, default_library, kmeans
+from facade_tools.exteriors.library import (
+    ElementLibrary,
+    build_library,
+    default_library,
+    kmeans,
+)
 from facade_tools.exteriors.palette import house_colors
 from facade_tools.geometry.blocked import wall_of
 from facade_tools.geometry.checks import building_problems
@@ -335,6 +341,66 @@ def test_no_sample_house_has_a_window_sunk_in_a_roof():
     for style in ("victorian", "split_garage", "hip_porches"):
         houses = read([str(HOUSES / f"{style}.jsonl")], "building")
         assert [house.id for house in houses if sunk(house)] == []
+
+
+# --- sidelights ---------------------------------------------------------------------------------
+
+
+def slim(element):
+    return element.kind == "window" and element.height > 3.0 * element.width
+
+
+def library_with(width: float, sidelights: bool, others: float):
+    """A library of one house: windows of one size all round, perhaps a pair beside the door."""
+    house = bare(sample("colonial"))
+    facades = {}
+    for side, pieces in facade_pieces(house).items():
+        row = []
+        for piece in pieces:
+            found = []
+            if piece.width > 4 and piece.height > 2.3:
+                tall = 1.8
+                count = int(piece.width // 2)
+                found = [
+                    Element("window", "fixed", (k + 0.5) * piece.width / count, 0.4, others, tall)
+                    for k in range(count)
+                ]
+                if side == "front" and piece.origin[2] == 0 and sidelights:
+                    middle = piece.width / 2
+                    door = Element("door", "panel", middle - 0.45, 0.0, 0.9, 2.1, True)
+                    lights = [
+                        Element("window", "fixed", middle + u, 0.3, width, 1.8)
+                        for u in (-0.95, 0.6)
+                    ]
+                    found = [door, *lights]
+            row.append(replace(piece, elements=tuple(found)))
+        facades[side] = Facade(tuple(row))
+    return ElementLibrary(build_library([replace(house, facades=facades, targets=None)]))
+
+
+def test_sidelights_stand_beside_the_main_door_and_nowhere_else():
+    shelf = library_with(0.35, True, 1.0)
+    beside = 0
+    for seed in range(12):
+        (done,) = made(bare(sample("colonial", seed)), seed, library=shelf)
+        assert list(building_problems(done)) == []
+        for _, piece, element in elements(done):
+            if not slim(element) or piece.width <= WIDE_WALL:
+                continue
+            doors = [e for e in piece.elements if e.main]
+            assert len(doors) == 1
+            gap = max(doors[0].u - element.u - element.width, element.u - doors[0].u - 0.9)
+            assert 0 < gap < 0.4
+            beside += 1
+    assert beside >= 8
+
+
+def test_a_library_of_slim_windows_alone_still_fills_walls():
+    shelf = library_with(0.35, False, 0.45)
+    (done,) = made(bare(sample("colonial", 1)), library=shelf)
+    windows = [e for _, _, e in elements(done) if e.kind == "window"]
+    assert len(windows) > 10
+    assert sum(map(slim, windows)) > 5
 
 
 # --- library and colours ------------------------------------------------------------------------

@@ -24,6 +24,7 @@ from .facade_layout import (
     LOWER,
     OPEN,
     QUIET,
+    SLIM,
     SUB,
     TALL,
     UPPER,
@@ -34,6 +35,7 @@ from .facade_sizing import sized
 
 LEAST_TARGET = 0.1  # a difference is divided by max(target, this)
 WIDE = 1.5  # upper bound of eq. 5, times the average size (the lower stands in `subs`)
+NO_SIDELIGHTS = 0.2  # what a main door without them is worth, where the library's building has some
 TASTE = 1e-3  # weight of what only looks better: far below what eq. 4 can tell apart
 
 
@@ -72,7 +74,7 @@ def widths(side: Side, genome: Floats, counts: Integers) -> Floats:
     """Return the width of each substyle (k,) on a side, by eq. 5.
 
     Each substyle has one width on the whole side, within 0.5 to 1.5 times its average and what the
-    walls allow; the total area of the side is the target ratio's. Doors keep their width.
+    walls allow; the total area of the side is the target ratio's. Doors and sidelights keep theirs.
     """
     k = len(side.subs)
     number, tall, high = np.zeros(k), np.zeros(k), np.empty(k)
@@ -91,7 +93,7 @@ def widths(side: Side, genome: Floats, counts: Integers) -> Floats:
     for e in range(len(side.fixed)):
         total -= side.fixed[e, 3] * side.fixed[e, 4]
     for sub in range(k):
-        if side.subs[sub, DOOR] > 0.0:
+        if side.subs[sub, DOOR] > 0.0 or side.subs[sub, SLIM] > 0.0:
             total -= out[sub] * tall[sub]
             number[sub] = 0.0
     if np.isnan(side.targets[0]):
@@ -174,7 +176,19 @@ def least_energy(side: Side) -> tuple[float, Floats]:
     ratio = side.targets[0]
     bound = _term(glass / wall, ratio) if glass / wall > ratio else 0.0
     even, plan = _least_symmetry(side, wall)
-    return bound + even + _least_alignment(len(side.stacked), side.targets[2]), plan
+    return bound + even + _least_alignment(_pairs(side), side.targets[2]), plan
+
+
+@compiled
+def _pairs(side: Side) -> int:
+    """Return how many stacked pairs may both hold elements."""
+    count = 0
+    for k in range(len(side.stacked)):
+        low, high = side.stacked[k]
+        under = side.room[low, OPEN] > 0.0 or side.pieces[low, 7] > 0.0
+        over = side.room[high, OPEN] > 0.0 or side.pieces[high, 7] > 0.0
+        count += 1 if under and over else 0
+    return count
 
 
 @compiled
@@ -248,7 +262,20 @@ def has_door(side: Side, genome: Floats, counts: Integers) -> bool:
 
 @compiled
 def _taste(side: Side, genome: Floats, counts: Integers, wide: Floats) -> float:
-    return _uneven(side, genome, counts, wide) + _unusual(side, genome, counts, wide)
+    worse = _uneven(side, genome, counts, wide) + _unusual(side, genome, counts, wide)
+    return worse + _plain_door(side, genome, counts)
+
+
+@compiled
+def _plain_door(side: Side, genome: Floats, counts: Integers) -> float:
+    """Return what it is worth that the main door has no sidelights."""
+    p = int(side.door[0])
+    if p < 0 or (counts[p] > 1 and side.subs[int(genome[p, 1, SUB]), SLIM] > 0.0):
+        return 0.0
+    for sub in range(len(side.subs)):
+        if side.subs[sub, SLIM] > 0.0 and side.subs[sub, GROUND] > 0.0:
+            return NO_SIDELIGHTS
+    return 0.0
 
 
 @compiled
@@ -271,7 +298,10 @@ def _uneven(side: Side, genome: Floats, counts: Integers, wide: Floats) -> float
 
 @compiled
 def _unusual(side: Side, genome: Floats, counts: Integers, wide: Floats) -> float:
-    """Return how far sizes are from their average, and kinds from their share in the library."""
+    """Return how far sizes are from their average, and kinds from their share in the library.
+
+    Sidelights have their place, not a share.
+    """
     extra = np.zeros(len(side.subs))  # elements of a substyle more than usual
     stretch = 0.0
     n = 0
@@ -279,13 +309,16 @@ def _unusual(side: Side, genome: Floats, counts: Integers, wide: Floats) -> floa
         column = ABOVE if side.room[p, UPPER] > 0.0 else GROUND
         weight = 1e-9
         for sub in range(len(extra)):
-            weight += side.subs[sub, column]
+            weight += side.subs[sub, column] * (1.0 - side.subs[sub, SLIM])
+        own = 0
         for e in range(counts[p]):
             sub = int(genome[p, e, SUB])
-            extra[sub] += 1.0
             stretch += (wide[sub] / side.subs[sub, WIDTH] - 1.0) ** 2
+            if side.subs[sub, SLIM] == 0.0:
+                extra[sub] += 1.0
+                own += 1
         for sub in range(len(extra)):
-            extra[sub] -= counts[p] * side.subs[sub, column] / weight
+            extra[sub] -= own * side.subs[sub, column] * (1.0 - side.subs[sub, SLIM]) / weight
         n += counts[p]
     unlike = 0.0
     for sub in range(len(extra)):

@@ -22,11 +22,15 @@ LOWEST_SILL = 0.1  # over the storey's floor or the roof below (m)
 LEAST_HEIGHT = 0.45  # of a window (m)
 AIR = 0.002  # so that rounding to millimetres touches nothing (m)
 SPARE = 0.05  # share of draws that take any size of window
+WIDE_WALL = 1.6  # in wider ones sidelights stand beside the main door alone (m)
+SIDELIGHTS = 0.7  # share of main doors that get a pair, where the library's building has some
 SQUEEZE = 0.75  # an element is placed where it has at least this share of its usual width
 
 SUB, CENTRE, LOWER, TALL, CLEAR = range(5)  # columns of a genome's element
 FLOOR, HEAD, UPPER, OPEN, QUIET = range(5)  # columns of `room`
-CODE, WIDTH, HEIGHT, DOOR, GROUND, ABOVE, TWIN, LOW = range(8)  # columns of `subs`
+CODE, WIDTH, HEIGHT, DOOR, GROUND, ABOVE, TWIN, LOW, SLIM, NEEDS, ROWS = range(
+    11
+)  # columns of `subs`
 
 
 class Side(NamedTuple):
@@ -36,9 +40,10 @@ class Side(NamedTuple):
     room (p, 5): v of the storey's floor and of the window heads; 1 in an upper storey; 1 where
     elements may be placed; 1 where few are expected (garages). fixed (f, 5): code, u, v, width,
     height of what stands. blocked (b, 5): piece, u0, v0, u1, v1. stacked (m, 2): lower and upper
-    piece. subs (k, 8): number of kind and style, average width and height, 1 for doors, weight on
-    the ground and above, row of the narrow twin or −1, least width. door (5,): piece that takes
-    the main door or −1, range of its centre, substyle, share of draws at the middle of the range.
+    piece. subs (k, 11): number of kind and style, average width and height, 1 for doors, weight on
+    the ground and above, row of the narrow twin or −1, least width, 1 for sidelights, width that a
+    place must offer, 1 for what may stand in rows in wide walls. door (5,): piece that takes the
+    main door or −1, range of its centre, substyle, share of draws at the middle of the range.
     targets (3,): wwr, sym, align, or NaN. plan (p,): 1 where a symmetric layout helps to meet sym.
     """
 
@@ -60,18 +65,23 @@ def pick(rng: np.random.Generator, side: Side, p: int, doors: bool) -> int:
     doors: whether doors may be drawn too. Now and then it is any window, also one of the spare
     sizes that weigh nothing: some targets cannot be met without.
     """
+    wide = side.pieces[p, 4] > WIDE_WALL
     if rng.random() < SPARE:
         any_one = int(rng.random() * len(side.subs))
-        return any_one if side.subs[any_one, DOOR] == 0.0 else -1
+        ordinary = not wide or side.subs[any_one, ROWS] > 0.0
+        return any_one if side.subs[any_one, DOOR] == 0.0 and ordinary else -1
     column = ABOVE if side.room[p, UPPER] > 0.0 else GROUND
     total = 0.0
     for k in range(len(side.subs)):
-        if doors or side.subs[k, DOOR] == 0.0:
+        ordinary = not wide or side.subs[k, ROWS] > 0.0
+        if ordinary and (doors or side.subs[k, DOOR] == 0.0):
             total += side.subs[k, column]
     mark = rng.random() * total
     last = -1
     for k in range(len(side.subs)):
-        if side.subs[k, column] > 0.0 and (doors or side.subs[k, DOOR] == 0.0):
+        ordinary = not wide or side.subs[k, ROWS] > 0.0
+        weighs = side.subs[k, column] > 0.0
+        if ordinary and weighs and (doors or side.subs[k, DOOR] == 0.0):
             last = k
             mark -= side.subs[k, column]
             if mark < 0.0:
@@ -122,18 +132,15 @@ def place(side: Side, p: int, sub: int, u: float, row: Floats, count: int) -> in
 
     Two neighbours share the wall between them in proportion to their usual widths.
     """
-    width = side.subs[sub, WIDTH]
     lower, tall = _bounds(side, p, sub, u)
     if count >= MOST or tall < LEAST_HEIGHT or lower + tall > side.pieces[p, 5] - 0.0999:
         return count
     clear = _free_width(side, p, u, lower, tall)
-    least = width if side.subs[sub, DOOR] > 0.0 else SQUEEZE * width
+    least = side.subs[sub, NEEDS]
     for k in range(count):
-        other = side.subs[int(row[k, SUB]), WIDTH]
         wall = abs(u - row[k, CENTRE]) - GAP
         mine, its = _shares(side, sub, int(row[k, SUB]), wall)
-        its_least = other if side.subs[int(row[k, SUB]), DOOR] > 0.0 else SQUEEZE * other
-        if its < its_least:
+        if its < side.subs[int(row[k, SUB]), NEEDS]:
             return count
         clear = min(clear, mine)
     if clear < least:
@@ -276,6 +283,8 @@ def draw_piece(
     even = rng.random() < 0.15 + 0.75 * side.plan[p]
     row = genome[p]
     n = _draw_door(rng, side, p, even, row) if side.door[0] == p else 0
+    if n == 1 and rng.random() < SIDELIGHTS:
+        n = _sidelights(side, p, row)
     sub = _window(rng, side, p)
     if sub < 0:
         counts[p] = n
@@ -351,3 +360,22 @@ def _draw_door(rng: np.random.Generator, side: Side, p: int, even: bool, row: Fl
             return 1
         at = low + (high - low) * rng.random()
     return 0
+
+
+@compiled
+def _sidelights(side: Side, p: int, row: Floats) -> int:
+    """Place a pair of slim windows beside the door, the row's only element; return how many stand.
+
+    Their substyle is the one that occurs most on the ground of this side; 1 where there is none, or
+    no room for both.
+    """
+    best, most = -1, 0.0
+    for k in range(len(side.subs)):
+        weight = side.subs[k, GROUND]
+        if side.subs[k, SLIM] > 0.0 and weight > most:
+            best, most = k, weight
+    if best < 0:
+        return 1
+    away = (side.subs[int(row[0, SUB]), WIDTH] + side.subs[best, WIDTH]) / 2 + GAP + 2 * AIR
+    n = place(side, p, best, row[0, CENTRE] - away, row, 1)
+    return 3 if place(side, p, best, row[0, CENTRE] + away, row, n) == 3 else 1

@@ -16,9 +16,14 @@ from .facade_layout import (
     ABOVE,
     CENTRE,
     CODE,
+    DOOR,
     GROUND,
+    HEIGHT,
     LOW,
     LOWER,
+    NEEDS,
+    ROWS,
+    SLIM,
     SQUEEZE,
     SUB,
     TALL,
@@ -34,6 +39,7 @@ LOW_ROOM = 1.65  # least height of a piece over its storey's floor that takes wi
 NARROW_ROOM = 0.9  # least width of such a piece (m)
 OVER_HEAD = 0.15  # least wall between a window's head and the top of its piece (m)
 NARROW = 0.5  # lower bound of eq. 5, times the average width
+SLENDER, SLIM_WIDTH = 3.0, 0.5  # sidelights: at least this slender, and narrower than this (m)
 LEVEL_HEAD = 1.9  # a storey's heads are not lowered under this for one low piece (m)
 
 
@@ -115,26 +121,36 @@ def _room(
 
 
 def sub_table(rows: Sequence[PartRow], codes: Codes, side: SideName) -> Floats:
-    """Return the substyles (k, 8) with the weights that they have on a side.
+    """Return the substyles (k, 11) with the weights that they have on a side.
 
-    Where the library's building has no window on such a side or storey, its windows elsewhere
-    stand in.
+    Where the library's building has no window but sidelights on such a side or storey, its windows
+    elsewhere stand in. One whose windows are all as slim has no sidelights.
     """
     windows = [k for k, row in enumerate(rows) if row.kind == "window"]
-    table = np.zeros((len(rows) + len(windows), 8))
+    table = np.zeros((len(rows) + len(windows), 11))
     for k, row in enumerate(rows):
         door = row.kind == "door"
         table[k, :4] = codes.number(row.kind, row.style), row.width, row.height, door
         table[k, TWIN], table[k, LOW] = -1.0, NARROW * row.width
         for level in (0, 1):
             table[k, 4 + level] = row.weights.get((END[side], level), 0.0)
-    _add_twins(table, windows)
     window = np.array([row.kind == "window" for row in rows])
+    slim = window & (table[: len(rows), WIDTH] * SLENDER < table[: len(rows), HEIGHT])
+    slim &= table[: len(rows), WIDTH] < SLIM_WIDTH
+    common = np.array([bool(row.weights) for row in rows]) & window & ~slim
+    if common.any():
+        table[: len(rows), SLIM] = slim
+    else:
+        common = window
+    _add_twins(table, windows)
     for level in (0, 1):
         for group in ([(s, level) for s in _KINDS], [(s, lv) for s in _KINDS for lv in (0, 1)]):
-            if not table[: len(rows)][window, 4 + level].any():
+            if not table[: len(rows)][common, 4 + level].any():
                 weights = [sum(row.weights.get(key, 0.0) for key in group) for row in rows]
-                table[: len(rows), 4 + level] += np.where(window, weights, 0.0)
+                table[: len(rows), 4 + level] += np.where(common, weights, 0.0)
+    rigid = (table[:, DOOR] > 0.0) | (table[:, SLIM] > 0.0)
+    table[:, NEEDS] = np.where(rigid, 1.0, SQUEEZE) * table[:, WIDTH]
+    table[:, ROWS] = (table[:, DOOR] > 0.0) | ((table[:, SLIM] == 0.0) & (table[:, TWIN] >= 0.0))
     doors = np.flatnonzero(~window)
     if side == "front":
         table[doors, GROUND] = 0.0
@@ -146,7 +162,7 @@ def _add_twins(table: Floats, windows: Sequence[int]) -> None:
     """Fill the last rows with narrow twins of the windows, for walls that are too narrow."""
     first = len(table) - len(windows)
     for twin, k in enumerate(windows, start=first):
-        table[twin, :4] = table[k, :4]
+        table[twin, :4], table[twin, SLIM] = table[k, :4], table[k, SLIM]
         table[twin, WIDTH] = max(0.6 * table[k, WIDTH], min(0.45, table[k, WIDTH]))
         table[twin, TWIN], table[twin, LOW] = -1.0, SQUEEZE * table[twin, WIDTH]
         table[k, TWIN] = twin

@@ -14,14 +14,17 @@ import pytest
 from test_export import FOOTPRINT, HOUSE, stream
 
 from facade_tools.cli.view import DRAWINGS
+from facade_tools.formats.gltf import write as write_glb
+from facade_tools.formats.meshes import read_scene
+from facade_tools.formats.png import write as write_png
 from facade_tools.geometry.detail_boxes import box_triangles
 from facade_tools.geometry.mesh import Material, Mesh, Scene
 from facade_tools.imaging.camera import View, directions, fitted
 from facade_tools.imaging.contact_sheet import contact_sheet
 from facade_tools.imaging.page import Exhibit, page
-from facade_tools.imaging.raster import rasterise
+from facade_tools.imaging.raster import NONE_CUT, rasterise
 from facade_tools.imaging.render import Look, render
-from facade_tools.imaging.surfaces import to_linear, to_srgb
+from facade_tools.imaging.surfaces import soup_of, to_linear, to_srgb
 
 SMALL = View(azimuth=0.0, elevation=20.0, size=(96, 72))
 ATTRIBUTES = {
@@ -67,7 +70,7 @@ def test_rasteriser_agrees_with_brute_force():
     corners[..., 2] = rng.uniform(0.1, 1.0, (12, 3))
     corners[0, 1] = corners[0, 0]  # degenerate
     depth, owner = np.zeros((14, 17)), np.full((14, 17), -1, dtype=np.int64)
-    rasterise(corners, depth, owner)
+    rasterise(corners, depth, owner, NONE_CUT)
     want_depth, want_owner = brute_force(corners, (14, 17))
     assert np.array_equal(owner, want_owner)
     assert np.allclose(depth, want_depth)
@@ -86,7 +89,7 @@ def test_triangles_that_share_an_edge_leave_no_gap():
         corners = np.ones((2, 3, 3))
         corners[0, :, :2], corners[1, :, :2] = (a, b, c), (b, a, d)
         owner = np.full((20, 20), -1, dtype=np.int64)
-        rasterise(corners, np.zeros((20, 20)), owner)
+        rasterise(corners, np.zeros((20, 20)), owner, NONE_CUT)
         hull = cv2.convexHull(np.array([a, b, c, d], np.float32))
         along = a + np.linspace(0.1, 0.9, 30)[:, None] * (b - a)
         for x, y in along:
@@ -154,17 +157,79 @@ def test_the_side_away_from_the_sun_is_darker_and_the_ground_in_shadow_too():
 
 
 def test_texture_is_drawn_where_its_uv_say():
-    from facade_tools.formats.png import write
-
     picture = np.zeros((2, 2, 3), np.uint8)
     picture[0] = (0, 255, 0)  # upper half green, lower half black
     vertices = np.array([(0.0, 0, 0), (4, 0, 0), (4, 0, 4), (0, 0, 4)])
     uv = np.array([(0.0, 0), (1, 0), (1, 1), (0, 1)])
     wall = Mesh("w", vertices, np.array([[0, 1, 2], [0, 2, 3]]), "t", uv)
-    scene = Scene("s", (wall,), {"t": Material("t", "#ffffff", texture=write(picture))})
+    scene = Scene("s", (wall,), {"t": Material("t", "#ffffff", texture=write_png(picture))})
     seen = render(scene, View(0.0, 0.0, (60, 60)), Look(edges=0.0)).astype(int)
     assert seen[15, 30, 1] > seen[15, 30, 0] + 60
     assert seen[45, 30].max() < 40
+
+
+def leaf_picture(opacity):
+    picture = np.full((64, 64, 4), (0, 255, 0, 255), np.uint8)
+    picture[16:48, 16:48] = (0, 0, 0, opacity)
+    return picture
+
+
+def leafy(opacity):
+    """Return a red wall, and a metre before it a green one with a square hole."""
+    corners = np.array([(0.0, 0, 0), (4, 0, 0), (4, 0, 4), (0, 0, 4)])
+    uv, faces = corners[:, [0, 2]] / 4, np.array([[0, 1, 2], [0, 2, 3]])
+    before = Mesh("before", corners, faces, "leaf", uv)
+    behind = Mesh("behind", corners + np.array([0, 1, 0]), faces, "red")
+    leaf = Material("leaf", "#ffffff", texture=write_png(leaf_picture(opacity)), cutout=True)
+    return Scene("s", (before, behind), {"leaf": leaf, "red": Material("red", "#ff0000")})
+
+
+@pytest.mark.parametrize(("opacity", "seen"), [(0, 0), (127, 0), (255, None)])
+def test_holes_of_a_texture_are_seen_through_and_let_the_sun_in(opacity, seen):
+    scene = leafy(opacity)
+    picture = render(scene, View(0.0, 0.0, (96, 96)), Look(edges=0.0, sun=(0.0, 1.0), rays=0))
+    middle, rim = picture[48, 48].astype(int), picture[12, 48].astype(int)
+    assert rim[1] > rim[0] + 60
+    if seen is None:
+        assert middle.max() < 40
+        return
+    assert middle[seen] > middle[1] + 60
+    behind = render(scene, View(0.0, 0.0, (96, 96)), Look(edges=0.0, sun=(90.0, 30.0), rays=0))
+    assert middle[0] > behind[48, 48].astype(int)[0] + 30  # the sun comes in through the hole
+
+
+def test_holes_survive_a_texture_that_is_scaled_down():
+    picture = np.full((2048, 2048, 4), 255, np.uint8)
+    picture[:, 1024:] = 0
+    look = Material("leaf", "#ffffff", texture=write_png(picture), cutout=True)
+    vertices = np.array([(0.0, 0, 0), (4, 0, 0), (4, 0, 4), (0, 0, 4)])
+    uv = np.array([(0.0, 0), (1, 0), (1, 1), (0, 1)])
+    wall = Mesh("w", vertices, np.array([[0, 1, 2], [0, 2, 3]]), "leaf", uv)
+    soup = soup_of(Scene("s", (wall,), {"leaf": look}))
+    first, height, width = soup.pictures[0]
+    texels = soup.texels[first:].reshape(height, width, 4)
+    assert (texels[:, : width // 2, :] == 255).all()
+    assert (texels[:, width // 2 :, 3] == 0).all()
+
+
+def test_holes_of_a_texture_go_into_the_page_as_a_mask():
+    data = write_glb([leafy(0)], "m")
+    document = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
+    modes = {row["name"]: row.get("alphaMode") for row in document["materials"]}
+    assert modes == {"leaf": "MASK", "red": None}
+
+
+def test_holes_of_a_mesh_file_s_texture_are_kept(tmp_path):
+    cv2.imwrite(str(tmp_path / "leaf.png"), leaf_picture(0))
+    (tmp_path / "m.mtl").write_text("newmtl leaf\nmap_Kd leaf.png\n")
+    corners = "v 0 0 0\nv 4 0 0\nv 4 4 0\nvt 0 0\nvt 1 0\nvt 1 1\n"
+    (tmp_path / "m.obj").write_text(f"mtllib m.mtl\n{corners}usemtl leaf\nf 1/1 2/2 3/3\n")
+    scene = read_scene(tmp_path / "m.obj")
+    (mesh,) = scene.meshes
+    look = scene.materials[mesh.material]
+    stored = cv2.imdecode(np.frombuffer(look.texture, np.uint8), cv2.IMREAD_UNCHANGED)
+    assert look.cutout
+    assert (stored[32, 32, 3], stored[2, 2, 3]) == (0, 255)
 
 
 def test_an_empty_scene_is_sky_and_ground():

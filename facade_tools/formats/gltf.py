@@ -130,6 +130,8 @@ class _Build:
                 self.images.append(material.texture)
             pbr["baseColorTexture"] = {"index": self.images.index(material.texture)}
         out: dict[str, Any] = {"name": material.name, "pbrMetallicRoughness": pbr}
+        if material.cutout:
+            return out | {"alphaMode": "MASK", "doubleSided": True}
         return out | ({"alphaMode": "BLEND"} if material.opacity < 1.0 else {})
 
     def file(self, name: str, roots: list[int]) -> bytes:

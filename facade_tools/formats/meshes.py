@@ -46,4 +46,8 @@ def _part(name: str, mesh: TexturedMesh, rows: np.ndarray[tuple[int], np.dtype[n
 def _material(name: str, paint: Paint) -> Material:
     if paint.picture is None:
         return Material(name, f"#{bytes(paint.color).hex()}")
-    return Material(name, WHITE, texture=png.write(paint.picture, effort=1))
+    pixels, cutout = paint.picture, paint.holes is not None
+    if paint.holes is not None:
+        alpha = np.where(paint.holes, 0, 255).astype(np.uint8)
+        pixels = np.dstack([pixels, alpha])
+    return Material(name, WHITE, texture=png.write(pixels, effort=1), cutout=cutout)

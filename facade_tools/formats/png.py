@@ -13,7 +13,7 @@ SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
 
 def write(picture: NDArray[np.uint8], effort: int = 6) -> bytes:
-    """Return the PNG of a picture (h, w) grey or (h, w, 3) sRGB.
+    """Return the PNG of a picture (h, w) grey, (h, w, 3) sRGB or (h, w, 4) with opacity.
 
     Rows are stored with the Sub filter, which suits drawings and renderings. effort: of the
     compression, 1 (several times as fast, a little larger) to 9.
@@ -22,7 +22,7 @@ def write(picture: NDArray[np.uint8], effort: int = 6) -> bytes:
     height, width, channels = rows.shape
     packer = zlib.compressobj(effort)
     packed = [packer.compress(_lines(rows[k : k + ROWS])) for k in range(0, height, ROWS)]
-    color = 2 if channels == 3 else 0
+    color = {1: 0, 3: 2, 4: 6}[channels]
     header = struct.pack(">IIBBBBB", width, height, 8, color, 0, 0, 0)
     chunks = ((b"IHDR", header), (b"IDAT", b"".join([*packed, packer.flush()])), (b"IEND", b""))
     return SIGNATURE + b"".join(_chunk(kind, data) for kind, data in chunks)

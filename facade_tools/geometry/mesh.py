@@ -11,9 +11,9 @@ from .arrays import Points2, Points3, Triangles
 class Material:
     """Surface of a mesh: sRGB colour #rrggbb, opacity, roughness and metalness in 0..1.
 
-    texture: an encoded PNG or JPEG picture (its bytes), multiplied with the colour. pattern:
-    `siding`, `shingle`, `brick` or nothing, drawn on the colour; in files only where the mesh has
-    texture coordinates.
+    texture: an encoded PNG or JPEG picture (its bytes), multiplied with the colour. cutout: one
+    sees through where the texture is more than half transparent. pattern: `siding`, `shingle`,
+    `brick` or nothing, drawn on the colour; in files only where the mesh has texture coordinates.
     """
 
     name: str
@@ -23,6 +23,7 @@ class Material:
     metallic: float = 0.0
     texture: bytes | None = None
     pattern: str = ""
+    cutout: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,8 +11,8 @@ from numpy.typing import NDArray
 from ..geometry.arrays import Floats, Points3
 from ..geometry.mesh import Scene
 from .camera import View, directions, fitted
-from .raster import rasterise
-from .shading import Air, Eye, Sun, shade, tone
+from .raster import NONE_CUT, Cutouts, rasterise
+from .shading import Air, Eye, Light, Sun, Three, shade, tone
 from .surfaces import Soup, linear_rgb, soup_of, to_srgb
 
 Picture = NDArray[np.uint8]  # (h, w, 3) sRGB
@@ -59,19 +60,37 @@ def render(scene: Scene, view: View | None = None, look: Look | None = None) -> 
     screen = camera.project(soup.corners)
     screen[..., 2] = 1.0 / screen[..., 2]
     screen[np.any(screen[..., 2] <= 0.0, axis=1)] = np.nan
-    rasterise(np.ascontiguousarray(screen), inverse, owner)
-    eye = Eye(camera.eye, camera.axes, camera.focal, _ground(points, look))
-    light = shade(owner, inverse, soup, eye, _sun(soup, points, view, look), _air(points, look))
-    small = light.reshape(height, look.samples, width, look.samples, 3).mean(axis=(1, 3))
-    tone(small)
-    return np.round(255 * to_srgb(small)).astype(np.uint8)
+    rasterise(np.ascontiguousarray(screen), inverse, owner, _cutouts(soup, screen[..., 2]))
+    eye = Eye(_three(camera.eye), _rows(camera.axes), camera.focal, _ground(points, look))
+    sun, shadow = _sun(soup, points, view, look)
+    light = Light(sun, _air(points, look), shadow, _ball(look.rays))
+    picture = shade(owner, inverse, soup, eye, light, look.samples)
+    tone(picture)
+    return np.round(255 * to_srgb(picture)).astype(np.uint8)
+
+
+def _cutouts(soup: Soup, weight: Floats) -> Cutouts:
+    """Return the pictures with holes of a scene, for corners (m, 3) of these weights."""
+    if not soup.cutouts.any():
+        return NONE_CUT
+    cut, pictures = soup.cutouts[soup.looks], soup.pictures[soup.looks]
+    return Cutouts(cut, pictures, soup.uv, np.ascontiguousarray(weight), soup.texels)
+
+
+def _three(values: Sequence[float] | Floats) -> Three:
+    first, second, third = map(float, values)
+    return first, second, third
+
+
+def _rows(axes: Floats) -> tuple[Three, Three, Three]:
+    return _three(axes[0]), _three(axes[1]), _three(axes[2])
 
 
 def _ground(points: Points3, look: Look) -> float:
     return float(points[:, 2].min()) if look.ground else -1e9
 
 
-def _sun(soup: Soup, points: Points3, view: View, look: Look) -> Sun:
+def _sun(soup: Soup, points: Points3, view: View, look: Look) -> tuple[Sun, Floats]:
     """Return the sun with its shadow map over all points (n, 3)."""
     axes = directions(view.azimuth + look.sun[0], look.sun[1])
     axes[2] = -axes[2]
@@ -83,20 +102,25 @@ def _sun(soup: Soup, points: Points3, view: View, look: Look) -> Sun:
     corners[..., 0] = SHADOW_SIZE / 2 + (corners[..., 0] - centre[0]) * per_metre
     corners[..., 1] = SHADOW_SIZE / 2 - (corners[..., 1] - centre[1]) * per_metre
     shadow = np.full((SHADOW_SIZE, SHADOW_SIZE), -1e9)
-    rasterise(np.ascontiguousarray(corners), shadow, np.zeros(shadow.shape, dtype=np.int64))
-    scale = np.array([centre[0], centre[1], per_metre, 1.5 / per_metre])
-    return Sun(shadow, axes, scale)
+    cutouts = _cutouts(soup, np.ones(corners.shape[:2]))
+    rasterise(np.ascontiguousarray(corners), shadow, np.zeros((0, 0), dtype=np.int64), cutouts)
+    scale = (float(centre[0]), float(centre[1]), per_metre, 1.5 / per_metre)
+    return Sun(_rows(axes), scale), shadow
 
 
 def _air(points: Points3, look: Look) -> Air:
     centre = (points.min(axis=0) + points.max(axis=0))[:2] / 2
     reach = float(np.linalg.norm(points[:, :2] - centre, axis=1).max()) + 1.0
-    sun, sky, bounce = (np.array(row) for row in (look.sunlight, look.skylight, look.bounce))
-    horizon, zenith, soil = (
-        np.array(linear_rgb(color)) for color in (look.horizon, look.zenith, look.soil)
+    return Air(
+        look.sunlight,
+        look.skylight,
+        look.bounce,
+        linear_rgb(look.horizon),
+        linear_rgb(look.zenith),
+        linear_rgb(look.soil),
+        _three([*centre, reach]),
+        look.edges,
     )
-    scene = np.array([*centre, reach])
-    return Air(sun, sky, bounce, horizon, zenith, soil, _ball(look.rays), scene, look.edges)
 
 
 def _ball(count: int) -> Floats:

@@ -1,4 +1,8 @@
-"""Compiled shading: from what each pixel sees to the light that it sends."""
+"""Compiled shading: from what each pixel sees to the light that it sends.
+
+Points and colours are tuples, not arrays, and tables are taken out of their records once: numba
+counts references to an array wherever it is looked up, which cost more than the shading itself.
+"""
 
 from __future__ import annotations
 
@@ -9,85 +13,132 @@ import numpy as np
 
 from ..compiled import compiled
 from ..geometry.arrays import Floats, Integers
+from .raster import texel
 from .surfaces import Soup
+
+Three = tuple[float, float, float]  # a point or direction (m), or linear RGB
 
 OCCLUSION_RADIUS = 0.9  # metres
 STEP = 0.04  # metres of depth between neighbouring parts that make an outline
 
 
 class Eye(NamedTuple):
-    """Pinhole: position, rows right, up, forward; focal length in pixels; ground plane's z."""
+    """Pinhole: position, axes right, up, forward; focal length in pixels; ground plane's z."""
 
-    place: Floats
-    axes: Floats
+    place: Three
+    axes: tuple[Three, Three, Three]
     focal: float
     ground: float
 
 
 class Sun(NamedTuple):
-    """Shadow map (s, s): height towards the sun of the first surface.
+    """Light from above: axes right, up, towards the sun; how a point falls on the shadow map.
 
-    axes: rows right, up, towards the sun. scale: centre x, y in the map's frame, pixels a metre,
-    bias (m).
+    scale: centre x, y in the map's frame, pixels a metre, bias (m).
     """
 
-    shadow: Floats
-    axes: Floats
-    scale: Floats
+    axes: tuple[Three, Three, Three]
+    scale: tuple[float, float, float, float]
 
 
 class Air(NamedTuple):
     """Light and surroundings, linear RGB.
 
     sun, sky, bounce: light from the sun, from above, from below. horizon, zenith, soil: colours.
-    ball (k, 3): points of the unit ball for the occlusion. scene: centre x, y and radius of what
-    is shown (m). edges: darkness of outlines, 0..1.
+    scene: centre x, y and radius of what is shown (m). edges: darkness of outlines, 0..1.
     """
 
-    sun: Floats
-    sky: Floats
-    bounce: Floats
-    horizon: Floats
-    zenith: Floats
-    soil: Floats
-    ball: Floats
-    scene: Floats
+    sun: Three
+    sky: Three
+    bounce: Three
+    horizon: Three
+    zenith: Three
+    soil: Three
+    scene: Three
     edges: float
 
 
-@compiled
-def shade(owner: Integers, inverse: Floats, soup: Soup, eye: Eye, sun: Sun, air: Air) -> Floats:
-    """Return linear light (h, w, 3) of pixels that see the triangle `owner` (-1: none).
+class Light(NamedTuple):
+    """What lights a scene.
 
-    inverse (h, w): 1 / depth where there is a triangle.
+    shadow (s, s): height towards the sun of the first surface. ball (k, 3): points of the unit
+    ball for the occlusion.
+    """
+
+    sun: Sun
+    air: Air
+    shadow: Floats
+    ball: Floats
+
+
+@compiled
+def shade(
+    owner: Integers, inverse: Floats, soup: Soup, eye: Eye, light: Light, samples: int
+) -> Floats:
+    """Return the mean linear light (h / samples, w / samples, 3) of blocks of samples.
+
+    owner (h, w): the triangle that a sample sees, -1: none. inverse (h, w): 1 / depth where there
+    is a triangle.
     """
     height, width = owner.shape
+    out = np.zeros((height // samples, width // samples, 3))
     depths = _depths(owner, inverse, eye)
-    out = np.empty((height, width, 3))
-    point, normal, color = np.empty(3), np.empty(3), np.empty(3)
+    sun, air, shadow, ball = light.sun, light.air, light.shadow, _turnable(light.ball, eye)
+    normals, parts, looks, gloss = soup.normals, soup.parts, soup.looks, soup.gloss
+    colors, patterns, pictures = soup.colors, soup.patterns, soup.pictures
     for j in range(height):
-        sky = 0.75 * (1.0 - j / height)
+        behind = _sky(0.75 * (1.0 - j / height), air)
         for i in range(width):
-            bare = owner[j, i] < 0
-            fade = 1.0
+            t = owner[j, i]
+            fade, point, color = 1.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
             if depths[j, i] < np.inf:
-                _place(i, j, depths[j, i], owner, eye, point)
-                fade = _fade(point, air) if bare else 0.0
+                point = _place(i, j, width, height, depths[j, i], eye)
+                fade = _fade(point, air) if t < 0 else 0.0
             if fade < 1.0:
-                _facing(owner[j, i], point, soup, eye, normal)
-                _base(owner[j, i], point, soup, air, color)
-                open_share = 1.0
-                if not bare or fade == 0.0:  # ground away from the scene has nothing over it
-                    open_share = _open((i, j), point, normal, depths, eye, air.ball)
-                _lit(point, normal, open_share, sun, air, color)
-                if not bare and soup.gloss[soup.looks[owner[j, i]]] > 0.0:
-                    _mirror(point, normal, eye, air, color)
-            dark = air.edges * _outline(i, j, owner, depths, soup)
+                normal, color, open_share = (0.0, 0.0, 1.0), air.soil, 1.0
+                if t >= 0:
+                    look = looks[t]
+                    normal = (normals[t, 0], normals[t, 1], normals[t, 2])
+                    color = (colors[look, 0], colors[look, 1], colors[look, 2])
+                    if patterns[look] > 0:
+                        color = _scaled(_pattern(patterns[look], point, normal), color)
+                    if pictures[look, 1] > 0:
+                        color = _textured(t, point, soup, color)
+                    normal = _facing(normal, point, eye)
+                if t >= 0 or fade == 0.0:  # ground away from the scene has nothing over it
+                    open_share = _open(i, j, normal, depths, eye, ball)
+                color = _lit(point, normal, open_share, sun, shadow, air, color)
+                if t >= 0 and gloss[looks[t]] > 0.0:
+                    color = _mirror(point, normal, eye, air, color)
+            dark = air.edges * _outline(i, j, owner, depths, normals, parts, looks)
             for k in range(3):
-                behind = _sky(k, sky, air)
-                shown = color[k] if fade < 1.0 else 0.0
-                out[j, i, k] = (shown * (1.0 - fade) + behind * fade) * (1.0 - dark)
-    return out
+                seen = (color[k] * (1.0 - fade) + behind[k] * fade) * (1.0 - dark)
+                out[j // samples, i // samples, k] += seen
+    return out / (samples * samples)
+
+
+@compiled
+def _textured(t: int, point: Three, soup: Soup, color: Three) -> Three:
+    """Return a colour times the nearest texel of triangle t."""
+    first, height, width = soup.pictures[soup.looks[t]]
+    u, v = _uv(t, point, soup.corners, soup.uv)
+    row = first + texel(u, v, height, width)
+    texels, tones = soup.texels, soup.tones
+    return (
+        color[0] * tones[texels[row, 0]],
+        color[1] * tones[texels[row, 1]],
+        color[2] * tones[texels[row, 2]],
+    )
+
+
+@compiled
+def _scaled(factor: float, row: Three) -> Three:
+    return factor * row[0], factor * row[1], factor * row[2]
+
+
+@compiled
+def _dot(a: Three, b: Three) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @compiled
@@ -95,11 +146,12 @@ def _depths(owner: Integers, inverse: Floats, eye: Eye) -> Floats:
     """Return depths along the view; the ground plane where no triangle is, inf in the sky."""
     height, width = owner.shape
     out = np.full((height, width), np.inf)
+    right, up, forward = eye.axes
     for j in range(height):
         sy = (height / 2 - j - 0.5) / eye.focal
         for i in range(width):
             sx = (i + 0.5 - width / 2) / eye.focal
-            fall = sx * eye.axes[0, 2] + sy * eye.axes[1, 2] + eye.axes[2, 2]
+            fall = sx * right[2] + sy * up[2] + forward[2]
             if owner[j, i] >= 0:
                 out[j, i] = 1.0 / inverse[j, i]
             elif fall < -1e-6 and eye.ground > -1e8:
@@ -108,17 +160,21 @@ def _depths(owner: Integers, inverse: Floats, eye: Eye) -> Floats:
 
 
 @compiled
-def _place(i: int, j: int, depth: float, owner: Integers, eye: Eye, point: Floats) -> None:
-    height, width = owner.shape
+def _place(i: int, j: int, width: int, height: int, depth: float, eye: Eye) -> Three:
+    """Return the point that a pixel sees."""
     sx = (i + 0.5 - width / 2) / eye.focal
     sy = (height / 2 - j - 0.5) / eye.focal
-    for k in range(3):
-        ray = sx * eye.axes[0, k] + sy * eye.axes[1, k] + eye.axes[2, k]
-        point[k] = eye.place[k] + depth * ray
+    right, up, forward = eye.axes
+    place = eye.place
+    return (
+        place[0] + depth * (sx * right[0] + sy * up[0] + forward[0]),
+        place[1] + depth * (sx * right[1] + sy * up[1] + forward[1]),
+        place[2] + depth * (sx * right[2] + sy * up[2] + forward[2]),
+    )
 
 
 @compiled
-def _fade(point: Floats, air: Air) -> float:
+def _fade(point: Three, air: Air) -> float:
     """Return how far the ground is lost in the sky: 0 at the scene, 1 far from it."""
     dx, dy = point[0] - air.scene[0], point[1] - air.scene[1]
     away = (sqrt(dx * dx + dy * dy) / air.scene[2] - 1.0) / 1.6
@@ -127,40 +183,18 @@ def _fade(point: Floats, air: Air) -> float:
 
 
 @compiled
-def _facing(triangle: int, point: Floats, soup: Soup, eye: Eye, normal: Floats) -> None:
-    """Set the normal that faces the eye."""
-    if triangle < 0:
-        normal[0], normal[1], normal[2] = 0.0, 0.0, 1.0
-        return
-    towards = 0.0
-    for k in range(3):
-        normal[k] = soup.normals[triangle, k]
-        towards += normal[k] * (eye.place[k] - point[k])
-    if towards < 0.0:
-        for k in range(3):
-            normal[k] = -normal[k]
+def _facing(normal: Three, point: Three, eye: Eye) -> Three:
+    """Return the normal that faces the eye."""
+    place = eye.place
+    towards = _dot(normal, (place[0] - point[0], place[1] - point[1], place[2] - point[2]))
+    return _scaled(-1.0 if towards < 0.0 else 1.0, normal)
 
 
 @compiled
-def _base(triangle: int, point: Floats, soup: Soup, air: Air, color: Floats) -> None:
-    """Set the surface's own colour: material, pattern, texture."""
-    if triangle < 0:
-        for k in range(3):
-            color[k] = air.soil[k]
-        return
-    look = soup.looks[triangle]
-    factor = 1.0
-    if soup.patterns[look] > 0:
-        factor = _pattern(soup.patterns[look], point, soup.normals[triangle])
-    for k in range(3):
-        color[k] = soup.colors[look, k] * factor
-    if soup.pictures[look, 1] > 0:
-        _texture(triangle, soup.pictures[look], point, soup, color)
-
-
-@compiled
-def _pattern(pattern: int, point: Floats, normal: Floats) -> float:
+def _pattern(pattern: int, point: Three, normal: Three) -> float:
     """Return the brightness of a pattern (index into PATTERNS) at a point."""
+    if pattern == 0:
+        return 1.0
     if pattern == 1:
         board = point[2] / 0.17
         within = board - floor(board)
@@ -173,7 +207,7 @@ def _pattern(pattern: int, point: Floats, normal: Floats) -> float:
 
 
 @compiled
-def _courses(point: Floats, normal: Floats, across: float, along: float, depth: float) -> float:
+def _courses(point: Three, normal: Three, across: float, along: float, depth: float) -> float:
     """Staggered tiles in rows, each a little lighter or darker than the next.
 
     across, along: size of a tile (m). depth: darkness of the joints.
@@ -193,126 +227,170 @@ def _courses(point: Floats, normal: Floats, across: float, along: float, depth: 
 
 
 @compiled
-def _texture(triangle: int, picture: Integers, point: Floats, soup: Soup, color: Floats) -> None:
-    """Multiply the colour with the nearest texel."""
+def _uv(t: int, point: Three, corners: Floats, uv: Floats) -> tuple[float, float]:
+    """Return the texture coordinates of a point of triangle t."""
     d00 = d01 = d11 = d20 = d21 = 0.0
     for k in range(3):
-        ab = soup.corners[triangle, 1, k] - soup.corners[triangle, 0, k]
-        ac = soup.corners[triangle, 2, k] - soup.corners[triangle, 0, k]
-        ap = point[k] - soup.corners[triangle, 0, k]
+        ab = corners[t, 1, k] - corners[t, 0, k]
+        ac = corners[t, 2, k] - corners[t, 0, k]
+        ap = point[k] - corners[t, 0, k]
         d00, d01, d11 = d00 + ab * ab, d01 + ab * ac, d11 + ac * ac
         d20, d21 = d20 + ap * ab, d21 + ap * ac
     scale = d00 * d11 - d01 * d01
     if scale == 0.0:
-        return
+        return uv[t, 0, 0], uv[t, 0, 1]
     b, c = (d11 * d20 - d01 * d21) / scale, (d00 * d21 - d01 * d20) / scale
-    at = soup.uv[triangle]
-    u = at[0, 0] + b * (at[1, 0] - at[0, 0]) + c * (at[2, 0] - at[0, 0])
-    v = at[0, 1] + b * (at[1, 1] - at[0, 1]) + c * (at[2, 1] - at[0, 1])
-    first, height, width = picture
-    column = min(int((u - floor(u)) * width), width - 1)
-    row = min(int((1.0 - (v - floor(v))) * height), height - 1)
-    for k in range(3):
-        color[k] *= soup.texels[first + row * width + column, k]
+    return (
+        uv[t, 0, 0] + b * (uv[t, 1, 0] - uv[t, 0, 0]) + c * (uv[t, 2, 0] - uv[t, 0, 0]),
+        uv[t, 0, 1] + b * (uv[t, 1, 1] - uv[t, 0, 1]) + c * (uv[t, 2, 1] - uv[t, 0, 1]),
+    )
 
 
 @compiled
-def _open(
-    pixel: tuple[int, int], point: Floats, normal: Floats, depths: Floats, eye: Eye, ball: Floats
-) -> float:
+def _open(i: int, j: int, normal: Three, depths: Floats, eye: Eye, ball: Floats) -> float:
     """Return the open share of the hemisphere over a pixel, from the depths around it.
 
     The sample points are turned by a hash of the pixel, so that a picture's bytes do not depend
     on a generator.
     """
     height, width = depths.shape
-    angle = ((pixel[0] * 73856093 ^ pixel[1] * 19349663) & 0xFFFF) * (2.0 * pi / 65536.0)
+    angle = ((i * 73856093 ^ j * 19349663) & 0xFFFF) * (2.0 * pi / 65536.0)
     cosine, sine = cos(angle), sin(angle)
+    lift, near = 0.05 * OCCLUSION_RADIUS, 1.5 * OCCLUSION_RADIUS
+    outward = _in_view(normal, eye)
+    x0 = (i + 0.5 - width / 2) / eye.focal * depths[j, i] + lift * outward[0]
+    y0 = (height / 2 - j - 0.5) / eye.focal * depths[j, i] + lift * outward[1]
+    z0 = depths[j, i] + lift * outward[2]
     hidden = 0.0
     for k in range(len(ball)):
-        dx = cosine * ball[k, 0] - sine * ball[k, 1]
-        dy = sine * ball[k, 0] + cosine * ball[k, 1]
-        dz = ball[k, 2]
-        side = 1.0 if dx * normal[0] + dy * normal[1] + dz * normal[2] >= 0.0 else -1.0
-        x = point[0] + OCCLUSION_RADIUS * (side * dx + 0.05 * normal[0]) - eye.place[0]
-        y = point[1] + OCCLUSION_RADIUS * (side * dy + 0.05 * normal[1]) - eye.place[1]
-        z = point[2] + OCCLUSION_RADIUS * (side * dz + 0.05 * normal[2]) - eye.place[2]
-        far = x * eye.axes[2, 0] + y * eye.axes[2, 1] + z * eye.axes[2, 2]
+        x = cosine * ball[k, 0] + sine * ball[k, 3]
+        y = cosine * ball[k, 1] + sine * ball[k, 4] + ball[k, 6]
+        z = cosine * ball[k, 2] + sine * ball[k, 5] + ball[k, 7]
+        outer = x * outward[0] + y * outward[1] + z * outward[2] >= 0.0
+        reach = OCCLUSION_RADIUS if outer else -OCCLUSION_RADIUS
+        far = z0 + reach * z
         if far <= 1e-6:
             continue
-        right = x * eye.axes[0, 0] + y * eye.axes[0, 1] + z * eye.axes[0, 2]
-        up = x * eye.axes[1, 0] + y * eye.axes[1, 1] + z * eye.axes[1, 2]
-        column = int(width / 2 + eye.focal * right / far)
-        row = int(height / 2 - eye.focal * up / far)
+        scale = eye.focal / far
+        column = int(width / 2 + scale * (x0 + reach * x))
+        row = int(height / 2 - scale * (y0 + reach * y))
         if 0 <= column < width and 0 <= row < height:
             gap = far - depths[row, column]
             if gap > 0.02 * OCCLUSION_RADIUS:
-                near = 1.5 * OCCLUSION_RADIUS
                 hidden += 1.0 if gap < near else max(near / gap - 0.3, 0.0)
     return 1.0 - hidden / max(len(ball), 1)
 
 
 @compiled
-def _sunlit(point: Floats, normal: Floats, sun: Sun) -> float:
+def _in_view(vector: Three, eye: Eye) -> Three:
+    """Return a direction's components to the right, up and forward."""
+    right, up, forward = eye.axes
+    return _dot(right, vector), _dot(up, vector), _dot(forward, vector)
+
+
+@compiled
+def _turnable(ball: Floats, eye: Eye) -> Floats:
+    """Return what points (k, 3) are in the view when they turn about the vertical, rows (k, 8).
+
+    Of each row: right, up, forward of the cosine's share and of the sine's; up, forward at rest.
+    """
+    out = np.empty((len(ball), 8))
+    for k in range(len(ball)):
+        x, y, z = ball[k, 0], ball[k, 1], ball[k, 2]
+        out[k, 0], out[k, 1], out[k, 2] = _in_view((x, y, 0.0), eye)
+        out[k, 3], out[k, 4], out[k, 5] = _in_view((-y, x, 0.0), eye)
+        _, out[k, 6], out[k, 7] = _in_view((0.0, 0.0, z), eye)
+    return out
+
+
+@compiled
+def _sunlit(point: Three, normal: Three, sun: Sun, shadow: Floats) -> float:
     """Return the share of sunlight by percentage-closer filtering of the shadow map."""
-    size = sun.shadow.shape[0]
-    x = y = z = 0.0
-    for k in range(3):
-        at = point[k] + 0.03 * normal[k]
-        x, y, z = x + sun.axes[0, k] * at, y + sun.axes[1, k] * at, z + sun.axes[2, k] * at
-    column = size / 2 + (x - sun.scale[0]) * sun.scale[2]
-    row = size / 2 - (y - sun.scale[1]) * sun.scale[2]
+    size = shadow.shape[0]
+    at = (
+        point[0] + 0.03 * normal[0],
+        point[1] + 0.03 * normal[1],
+        point[2] + 0.03 * normal[2],
+    )
+    right, up, towards = sun.axes
+    column = size / 2 + (_dot(right, at) - sun.scale[0]) * sun.scale[2]
+    row = size / 2 - (_dot(up, at) - sun.scale[1]) * sun.scale[2]
+    limit = _dot(towards, at) + sun.scale[3]
     lit = 0
     for dy in range(-1, 2):
         for dx in range(-1, 2):
             r, c = floor(row + 0.8 * dy), floor(column + 0.8 * dx)
             inside = 0 <= r < size and 0 <= c < size
-            lit += not inside or sun.shadow[r, c] <= z + sun.scale[3]
+            lit += not inside or shadow[r, c] <= limit
     return lit / 9.0
 
 
 @compiled
 def _lit(
-    point: Floats, normal: Floats, open_share: float, sun: Sun, air: Air, color: Floats
-) -> None:
-    """Multiply the colour with the light that falls on it."""
-    direct = 0.0
-    for k in range(3):
-        direct += sun.axes[2, k] * normal[k]
-    direct = max(direct, 0.0)
+    point: Three,
+    normal: Three,
+    open_share: float,
+    sun: Sun,
+    shadow: Floats,
+    air: Air,
+    color: Three,
+) -> Three:
+    """Return the colour in the light that falls on it."""
+    direct = max(_dot(sun.axes[2], normal), 0.0)
     if direct > 0.0:
-        direct *= _sunlit(point, normal, sun)
+        direct *= _sunlit(point, normal, sun, shadow)
     above = (0.5 + 0.5 * normal[2]) * open_share
-    for k in range(3):
-        around = above * air.sky[k] + (open_share - above) * air.bounce[k]
-        color[k] *= direct * air.sun[k] + around
+    below = open_share - above
+    return (
+        color[0] * (direct * air.sun[0] + (above * air.sky[0] + below * air.bounce[0])),
+        color[1] * (direct * air.sun[1] + (above * air.sky[1] + below * air.bounce[1])),
+        color[2] * (direct * air.sun[2] + (above * air.sky[2] + below * air.bounce[2])),
+    )
 
 
 @compiled
-def _sky(k: int, rise: float, air: Air) -> float:
-    """Return channel k of the sky in a direction of the given rise (0 horizon, 1 overhead)."""
-    return float(air.horizon[k] + (air.zenith[k] - air.horizon[k]) * max(rise, 0.0) ** 0.6)
+def _sky(rise: float, air: Air) -> Three:
+    """Return the sky in a direction of the given rise (0 horizon, 1 overhead)."""
+    share = max(rise, 0.0) ** 0.6
+    low, high = air.horizon, air.zenith
+    return (
+        low[0] + (high[0] - low[0]) * share,
+        low[1] + (high[1] - low[1]) * share,
+        low[2] + (high[2] - low[2]) * share,
+    )
 
 
 @compiled
-def _mirror(point: Floats, normal: Floats, eye: Eye, air: Air, color: Floats) -> None:
-    """Add what a glossy surface mirrors; towards the horizon it is trees more than sky."""
-    length = dot = 0.0
-    for k in range(3):
-        ray = point[k] - eye.place[k]
-        length += ray * ray
-        dot += ray * normal[k]
-    length = sqrt(length)
-    cosine = min(max(-dot / length, 0.0), 1.0)
-    rise = (point[2] - eye.place[2]) / length + 2.0 * cosine * normal[2]
+def _mirror(point: Three, normal: Three, eye: Eye, air: Air, color: Three) -> Three:
+    """Return a colour with what a glossy surface mirrors.
+
+    Towards the horizon it is trees more than sky.
+    """
+    place = eye.place
+    ray = (point[0] - place[0], point[1] - place[1], point[2] - place[2])
+    length = sqrt(_dot(ray, ray))
+    cosine = min(max(-_dot(ray, normal) / length, 0.0), 1.0)
+    rise = ray[2] / length + 2.0 * cosine * normal[2]
     share = 0.1 + 0.75 * (1.0 - cosine) ** 3
     bright = min(max(0.5 + 1.6 * rise, 0.18), 1.0)
-    for k in range(3):
-        color[k] = color[k] * (1.0 - share) + _sky(k, rise, air) * bright * share
+    sky = _sky(rise, air)
+    return (
+        color[0] * (1.0 - share) + sky[0] * bright * share,
+        color[1] * (1.0 - share) + sky[1] * bright * share,
+        color[2] * (1.0 - share) + sky[2] * bright * share,
+    )
 
 
 @compiled
-def _outline(i: int, j: int, owner: Integers, depths: Floats, soup: Soup) -> float:
+def _outline(
+    i: int,
+    j: int,
+    owner: Integers,
+    depths: Floats,
+    normals: Floats,
+    parts: Integers,
+    looks: Integers,
+) -> float:
     """Return 1 where the pixel and its right or lower neighbour see different planes or parts."""
     height, width = owner.shape
     a = owner[j, i]
@@ -329,10 +407,10 @@ def _outline(i: int, j: int, owner: Integers, depths: Floats, soup: Soup) -> flo
             continue
         bend = 0.0
         for k in range(3):
-            bend += soup.normals[a, k] * soup.normals[b, k]
+            bend += normals[a, k] * normals[b, k]
         if bend < 0.75:
             return 1.0
-        other = soup.parts[a] != soup.parts[b] or soup.looks[a] != soup.looks[b]
+        other = parts[a] != parts[b] or looks[a] != looks[b]
         if other and abs(depths[j, i] - depths[row, column]) > STEP:
             return 1.0
     return 0.0

@@ -5,9 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..geometry.arrays import Floats, Integers
+from ..geometry.arrays import Booleans, Floats, Integers
 from ..geometry.mesh import Material, Scene
+
+Bytes = NDArray[np.uint8]
 
 PATTERNS = ("", "siding", "shingle", "brick", "stone")
 GLOSSY = 0.35  # materials smoother than this mirror the sky
@@ -20,7 +23,8 @@ class Soup(NamedTuple):
     looks, parts (m,): row of the tables below, number of the named part. uv (m, 3, 2). Of a look:
     colors (k, 3) linear light; patterns (k,) index into PATTERNS; gloss (k,) 1 mirrors the sky;
     pictures (k, 3) first row in `texels`, height and width, height 0 without a texture.
-    texels (n, 3): all textures' pixels, linear light.
+    cutouts (k,) whether one sees through the picture's holes. texels (n, 4): all textures' pixels,
+    sRGB and opacity. tones (256,): linear light of the values of a texel.
     """
 
     corners: Floats
@@ -32,7 +36,9 @@ class Soup(NamedTuple):
     patterns: Integers
     gloss: Floats
     pictures: Integers
-    texels: Floats
+    cutouts: Booleans
+    texels: Bytes
+    tones: Floats
 
 
 def soup_of(scene: Scene) -> Soup:
@@ -58,7 +64,9 @@ def soup_of(scene: Scene) -> Soup:
         np.array([PATTERNS.index(look.pattern) for look in looks], dtype=np.int64),
         np.array([float(look.roughness < GLOSSY) for look in looks]),
         pictures,
+        np.array([look.cutout and pictures[k, 1] > 0 for k, look in enumerate(looks)], dtype=bool),
         texels,
+        to_linear(np.arange(256) / 255.0),
     )
 
 
@@ -83,30 +91,55 @@ def to_srgb(values: Floats) -> Floats:
     return np.where(v <= 0.0031308, 12.92 * v, 1.055 * v ** (1 / 2.4) - 0.055)
 
 
-def _textures(looks: list[Material]) -> tuple[Integers, Floats]:
+def _textures(looks: list[Material]) -> tuple[Integers, Bytes]:
     """Return where each look's picture lies in the rows of all pictures' pixels, and those rows."""
     pictures = np.zeros((len(looks), 3), dtype=np.int64)
-    rows = [np.zeros((1, 3))]
-    known: dict[bytes, tuple[int, int, int]] = {}
+    rows = [np.zeros((1, 4), dtype=np.uint8)]
+    known: dict[tuple[bytes, bool], tuple[int, int, int]] = {}
     for index, look in enumerate(looks):
         if look.texture is None or look.pattern:
             continue
-        if look.texture not in known:
-            pixels = _decoded(look.texture)
-            known[look.texture] = (sum(map(len, rows)), pixels.shape[0], pixels.shape[1])
-            rows.append(pixels.reshape(-1, 3))
-        pictures[index] = known[look.texture]
+        key = (look.texture, look.cutout)
+        if key not in known:
+            pixels = _decoded(look)
+            known[key] = (sum(map(len, rows)), pixels.shape[0], pixels.shape[1])
+            rows.append(pixels.reshape(-1, 4))
+        pictures[index] = known[key]
     return pictures, np.concatenate(rows)
 
 
-def _decoded(data: bytes) -> Floats:
+def _decoded(look: Material) -> Bytes:
+    """Return a texture's pixels (h, w, 4), at most the largest size; white if it is broken."""
     import cv2
 
-    picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
-    if picture is None:
-        return np.ones((1, 1, 3))
+    data = np.frombuffer(look.texture or b"", np.uint8)
+    read = cv2.imdecode(data, cv2.IMREAD_COLOR)
+    if read is None:
+        return np.full((1, 1, 4), 255, dtype=np.uint8)
+    picture, opacity = read.astype(np.uint8), None
+    if look.cutout:
+        stored = cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
+        if stored is not None and stored.shape[2:] == (4,):
+            opacity = stored[:, :, 3].astype(np.uint8)
     longest = max(picture.shape[:2])
     if longest > LARGEST_TEXTURE:
         height, width = (max(1, n * LARGEST_TEXTURE // longest) for n in picture.shape[:2])
-        picture = cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA)
-    return to_linear(np.asarray(picture[:, :, ::-1] / 255.0, dtype=np.float64))
+        picture, opacity = _shrunk(picture, opacity, (width, height))
+    if opacity is None:
+        opacity = np.full(picture.shape[:2], 255, dtype=np.uint8)
+    return np.dstack([picture[:, :, ::-1], opacity])
+
+
+def _shrunk(
+    picture: Bytes, opacity: Bytes | None, size: tuple[int, int]
+) -> tuple[Bytes, Bytes | None]:
+    """Return a picture and its opacity at a smaller size; what is hidden lends no colour."""
+    import cv2
+
+    if opacity is None:
+        return cv2.resize(picture, size, interpolation=cv2.INTER_AREA).astype(np.uint8), None
+    share = opacity.astype(np.float32)[:, :, None]
+    weighted = np.dstack([picture * share, share])
+    small = cv2.resize(weighted, size, interpolation=cv2.INTER_AREA)
+    color = small[:, :, :3] / np.maximum(small[:, :, 3:], 1e-6)
+    return np.round(color).astype(np.uint8), np.round(small[:, :, 3]).astype(np.uint8)

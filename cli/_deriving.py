@@ -22,8 +22,8 @@ from facade_tools.reconstruction.records import derivation_of
 from ._items import each
 from ._lots import Ground, grounds
 from ._models import Made, Wanted, wanted, write_models
-from ._options import StreamOptions, finite
-from ._stream import Faults, refuse_overwriting, refuse_single, side_input
+from ._options import StreamOptions, finite, refuse_overwriting
+from ._stream import Faults, refuse_single, side_input
 
 NAME = "derive"
 

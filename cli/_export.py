@@ -18,7 +18,7 @@ from facade_tools.formats.exporting import ENDINGS, model_files, placed, vertex_
 
 from ._items import each, load
 from ._options import StreamOptions
-from ._stream import Faults, file_name, is_folder, new_file_name, refuse_overwriting, to_stdout
+from ._stream import Faults, file_name, is_folder, new_file_name, to_stdout
 
 MOST_VERTICES = 30_000_000  # in one file: about 2 GB of memory
 
@@ -81,7 +81,6 @@ def run_export(stream: StreamOptions, form: str | None, arrange: str) -> None:
     output = stream.output
     if output is None:
         raise click.UsageError("Missing option '-o': name a file or a folder.")
-    refuse_overwriting(stream.inputs, [output])
     if output == "-":
         _to_stdout(stream, form or "glb", arrange)
     elif _ending(output) is None and is_folder(output):

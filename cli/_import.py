@@ -20,14 +20,13 @@ from facade_tools.parallel import Outcome, map_ordered
 
 from ._options import StreamOptions
 from ._report import Progress
-from ._stream import Faults, Write, open_sink, refuse_overwriting
+from ._stream import Faults, Write, open_sink
 
 logger = logging.getLogger("facade_tools.import")
 
 
 def run_import(options: ReadOptions, stream: StreamOptions) -> None:
     """Import all inputs; raises the first error, or after --on-error skip the last."""
-    refuse_overwriting(stream.inputs, [stream.output])
     importer = Importer(options, _recorded(options), _converter(options))
     outcomes = map_ordered(
         importer, items(stream.inputs, options), jobs=stream.jobs, scheduler=stream.scheduler

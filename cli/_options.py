@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import wraps
 from math import isfinite
@@ -23,6 +24,36 @@ class StreamOptions:
     jobs: int
     scheduler: str | None
     on_error: str
+
+
+# Options of stages that name what is written beside the output.
+RESULTS = ("report", "sheet", "tree", "raw_labels", "overlay")
+
+
+def refuse_overwriting(read: Iterable[str | None], written: Iterable[str | None]) -> None:
+    """Raise UsageError where a file that is written is one that is read, or is written twice.
+
+    None, `-` and "" are no files.
+    """
+    sources = {os.path.realpath(path) for path in read if path not in (None, "-") and path}
+    seen: set[str] = set()
+    for path in written:
+        if not path or path == "-":
+            continue
+        place = os.path.realpath(path)
+        if place in sources:
+            raise click.UsageError(f"{path}: is an input and would be overwritten; name another")
+        if place in seen:
+            raise click.UsageError(f"{path}: would be written twice; name another")
+        seen.add(place)
+
+
+def _refuse_own_inputs(stream: StreamOptions, values: Mapping[str, Any]) -> None:
+    """Raise UsageError where a stage would overwrite an input, or a file that an option names."""
+    named = [value for name, value in values.items() if name not in (*RESULTS, "labels")]
+    files = [value for value in named if isinstance(value, str) and os.path.isfile(value)]
+    for target in (stream.output, *(values.get(name) for name in RESULTS)):
+        refuse_overwriting([*stream.inputs, *files], [target])
 
 
 def finite(text: str) -> float:
@@ -108,7 +139,9 @@ def stream_options(
         def gather(**values: Any) -> Any:
             names = StreamOptions.__dataclass_fields__
             taken = {name: values.pop(name) for name in names if name in values}
-            return function(stream=StreamOptions(**{"seed": None, **taken}), **values)
+            stream = StreamOptions(**{"seed": None, **taken})
+            _refuse_own_inputs(stream, values)
+            return function(stream=stream, **values)
 
         options = [
             inputs(metavar, required),

@@ -27,7 +27,7 @@ from facade_tools.parallel import map_ordered
 from facade_tools.randomness import item_generator
 
 from ._items import load
-from ._options import StreamOptions
+from ._options import StreamOptions, refuse_overwriting
 from ._rectifying import check_rectification, rectification_of
 from ._report import Progress
 from ._stream import (
@@ -37,7 +37,6 @@ from ._stream import (
     is_single,
     new_file_name,
     open_sink,
-    refuse_overwriting,
     refuse_single,
     side_input,
 )

@@ -21,8 +21,8 @@ from facade_tools.reconstruction.reconstruct import Ask, reconstruct
 from ._items import each
 from ._lots import Plot, plots
 from ._models import Made, Wanted, wanted, write_models
-from ._options import StreamOptions
-from ._stream import Faults, refuse_overwriting, side_input
+from ._options import StreamOptions, refuse_overwriting
+from ._stream import Faults, side_input
 
 NAME = "reconstruct"
 

@@ -17,7 +17,8 @@ from facade_tools.imaging.homography import Points
 from facade_tools.imaging.image_io import Photo, encoded, read_photo
 from facade_tools.imaging.rectify import Rectification, automatic, from_corners, from_report
 
-from ._stream import refuse_overwriting, to_stdout
+from ._options import refuse_overwriting
+from ._stream import to_stdout
 
 LOG = logging.getLogger("facade_tools.rectify")
 

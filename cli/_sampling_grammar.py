@@ -19,7 +19,8 @@ from facade_tools.randomness import item_generator
 from facade_tools.segmentation.painting import render_facade
 from facade_tools.segmentation.random_parse import random_parse
 
-from ._stream import open_sink, refuse_overwriting, refuse_single, side_input
+from ._options import refuse_overwriting
+from ._stream import open_sink, refuse_single, side_input
 
 NAME = "sample-grammar"
 

@@ -139,7 +139,7 @@ def write_items(
     """Write what `function` makes of each item; bad items go to `faults`."""
     outcomes = map_ordered(function, items, jobs=stream.jobs, scheduler=stream.scheduler)
     progress = Progress(faults.stage)
-    with open_sink(stream.output) as write, closing(outcomes):
+    with open_sink(stream.output, inputs=stream.inputs) as write, closing(outcomes):
         for outcome in outcomes:
             if outcome.value is not None:
                 show_messages(outcome.value.messages)
@@ -186,12 +186,17 @@ def one_by_one(output: str | None) -> bool:
 
 
 @contextmanager
-def open_sink(output: str | None, suffix: str = ".json") -> Iterator[Write]:
-    """Open what takes the results: standard output, one file, or a folder with a file an item."""
+def open_sink(
+    output: str | None, suffix: str = ".json", inputs: Iterable[str] = ()
+) -> Iterator[Write]:
+    """Open what takes the results: standard output, one file, or a folder with a file an item.
+
+    inputs: files that no item may overwrite.
+    """
     if output is None or output == "-":
         yield to_stdout
     elif is_folder(output):
-        yield _to_folder(Path(output), suffix)
+        yield _to_folder(Path(output), suffix, frozenset(map(os.path.realpath, inputs)))
     else:
         with atomic_file(Path(output)) as file:
             yield _to_file(file, output)
@@ -221,11 +226,13 @@ def _to_file(file: BinaryIO, output: str) -> Write:
     return write
 
 
-def _to_folder(folder: Path, suffix: str) -> Write:
+def _to_folder(folder: Path, suffix: str, inputs: frozenset[str]) -> Write:
     seen: dict[str, str] = {}
 
     def write(identity: str, data: bytes) -> None:
         name = new_file_name(identity, seen) + suffix
+        if os.path.realpath(folder / name) in inputs:
+            raise OutputFailed(f"{folder / name}: is an input; name another folder")
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -262,24 +269,6 @@ def refuse_single(output: str | None, count: int, noun: str) -> None:
     """Raise UsageError where one .json file is to take several artifacts."""
     if count > 1 and is_single(output):
         raise click.UsageError(f"{output}: several {noun}; name a .jsonl file or a folder")
-
-
-def refuse_overwriting(read: Iterable[str | None], written: Iterable[str | None]) -> None:
-    """Raise UsageError where a file that is written is one that is read, or is written twice.
-
-    For stages whose results are of another kind than what they read; None and `-` are no files.
-    """
-    sources = {os.path.realpath(path) for path in read if path not in (None, "-") and path}
-    seen: set[str] = set()
-    for path in written:
-        if not path or path == "-":
-            continue
-        place = os.path.realpath(path)
-        if place in sources:
-            raise click.UsageError(f"{path}: is an input and would be overwritten; name another")
-        if place in seen:
-            raise click.UsageError(f"{path}: would be written twice; name another")
-        seen.add(place)
 
 
 def write_result(artifact: Any, output: str | None) -> None:

@@ -43,7 +43,7 @@ from facade_tools.stylization.style import Style
 
 from ._export import write_files
 from ._items import each
-from ._options import StreamOptions
+from ._options import StreamOptions, refuse_overwriting
 from ._stream import Faults, file_name, is_folder, new_file_name
 
 log = logging.getLogger("facade_tools.capture_style")
@@ -146,6 +146,7 @@ def run_retarget(
 ) -> None:
     """Put styles onto all bases and write their models."""
     output = str(stream.output)
+    refuse_overwriting([*styles, *stream.inputs], [output])
     sizes = dict(_size(text) for text in resize)
     form = _form(output)
     sources = _sources(stream.inputs)

@@ -18,6 +18,7 @@ from facade_tools.segmentation.network_training import NetworkOptions
 from facade_tools.segmentation.patches import ForestOptions
 from facade_tools.segmentation.training import TrainOptions, load_start, read_pairs, train
 
+from ._options import refuse_overwriting
 from ._stream import to_stdout
 
 COARSE = 288  # rows
@@ -32,6 +33,7 @@ def run_training(
     coarse, height = values["coarse"], values["height"]
     if coarse is not None and coarse > height:
         raise click.UsageError(f"--coarse {coarse} is above --height {height}")
+    refuse_overwriting([images, labels, values["start"]], [output])
     start = None if values["start"] is None else load_start(values["start"])
     options = TrainOptions(
         features=values["features"], stages=values["stages"], height=height,

@@ -17,7 +17,7 @@ from facade_tools.parallel import map_ordered
 
 from ._options import StreamOptions
 from ._report import Progress
-from ._stream import is_single, open_sink, refuse_overwriting
+from ._stream import is_single, open_sink
 
 # Kind of artifact -> function that yields its problems.
 RULES = {
@@ -48,7 +48,6 @@ class Finding(NamedTuple):
 
 def run_validation(stream: StreamOptions, form: str) -> None:
     """Check all inputs and write the findings; raises InvalidInput if there is any."""
-    refuse_overwriting(stream.inputs, [stream.output])
     if is_single(stream.output):
         text = f"{stream.output}: findings are one a line; name a .txt or .jsonl file"
         raise click.UsageError(text)

@@ -43,5 +43,6 @@ def command(design: str, output: str | None, seed: int, on_error: str, **options
     """
     from ._layer_solve import run_layer_solve
 
+    _options.refuse_overwriting([design], [output, str(options["sheet"] or "")])
     stream = _options.StreamOptions((design,), output, seed, 1, None, on_error)
     run_layer_solve(design, stream, options)

@@ -55,6 +55,7 @@ def command(
 
     from ._learning import Drawing, load_model, read_given, write_samples
 
+    _options.refuse_overwriting([model, given], [output])
     loaded, source = load_model(model, tables=given is None)
     known, sources = read_given(given)
     recorded = {"style": style, "top": top, "min_distance": min_distance, "smooth": smooth}

@@ -179,9 +179,11 @@ def test_one_json_file_holds_one_artifact(facade, tmp_path):
 
 @pytest.mark.parametrize(("stage", "name"), [
     ("export", "a.city.json"), ("import", "a.city.json"), ("import", "./b/../a.city.json"),
-    ("reconstruct", "a.json"), ("validate", "a.jsonl"),
+    ("reconstruct", "a.json"), ("validate", "a.jsonl"), ("attributes", "a.jsonl"),
+    ("massgen", "a.jsonl"), ("facadegen", "a.jsonl"), ("learn", "a.json"), ("sample", "a.json"),
+    ("layer-solve", "a.json"), ("view", "a.png"), ("assemble", "a.json"),
 ])  # fmt: skip
-def test_results_of_another_kind_do_not_overwrite_their_input(facade_here, tmp_path, stage, name):
+def test_results_do_not_overwrite_their_input(facade_here, tmp_path, stage, name):
     (tmp_path / "b").mkdir()
     path = tmp_path / name
     path.write_text("{}")
@@ -189,6 +191,25 @@ def test_results_of_another_kind_do_not_overwrite_their_input(facade_here, tmp_p
     assert done.returncode == 2, done.stderr
     assert b"is an input and would be overwritten" in done.stderr
     assert path.read_text() == "{}"
+
+
+@pytest.mark.parametrize("option", ["--keep", "--library"])
+def test_results_do_not_overwrite_what_an_option_names(facade_here, tmp_path, option):
+    (tmp_path / "a.json").write_text("{}")
+    done = facade_here("facadegen", BUNGALOWS, option, "./a.json", "-o", "a.json", cwd=tmp_path)
+    assert done.returncode == 2, done.stderr
+    assert b"is an input and would be overwritten" in done.stderr
+
+
+def test_a_folder_of_results_does_not_overwrite_an_input_in_it(facade_here, tmp_path):
+    first = BUNGALOWS.read_bytes().splitlines()[0]
+    path = tmp_path / f"{json.loads(first)['id']}.json"
+    path.write_bytes(first)
+    for output in (".", "other"):
+        done = facade_here("attributes", path, "-o", output, cwd=tmp_path)
+        assert done.returncode == (1 if output == "." else 0)
+        assert path.read_bytes() == first
+    assert facade_here("attributes", ".", "-o", tmp_path, cwd=tmp_path).returncode == 2
 
 
 def test_devices_are_no_folders_and_no_path_is_no_folder_either(facade_here, tmp_path):
@@ -226,14 +247,6 @@ def test_findings_are_no_single_json_document(facade_here, tmp_path):
     done = facade_here("validate", BUNGALOWS, "-o", "x.json", cwd=tmp_path)
     assert done.returncode == 2
     assert b"name a .txt or .jsonl file" in done.stderr
-
-
-def test_a_stage_from_json_to_json_may_replace_its_input(facade_here, tmp_path):
-    path = tmp_path / "house.jsonl"
-    path.write_bytes(BUNGALOWS.read_bytes())
-    assert facade_here("attributes", path, "-o", path).returncode == 0
-    assert facade_here("validate", path).returncode == 0
-    assert json.loads(path.read_bytes().splitlines()[0])["schema"] == "facade-tools/attributes/1"
 
 
 def test_ids_cannot_leave_the_folder(facade, tmp_path):

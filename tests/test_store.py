@@ -296,3 +296,20 @@ def test_provenance_has_no_clock_and_no_path():
     document = encode(Building(building.id, building.boxes, provenance=provenance))
     assert set(document["provenance"]) == {"stage", "seed", "options", "inputs", "tool", "version"}
     decode(json.loads(json.dumps(document)))
+
+
+@pytest.mark.parametrize("shape", ["list", "object"])
+def test_free_fields_are_read_up_to_a_depth_and_refused_beyond(shape):
+    def nested(levels):
+        value = {}
+        for _ in range(levels - 2):
+            value = [value] if shape == "list" else {"a": value}
+        return {"x": value}
+
+    house = {"schema": "facade-tools/footprint/1", "id": "f", "height": 5,
+             "polygon": [[[0, 0], [8, 0], [8, 6], [0, 6]]]}  # fmt: skip
+    assert decode({**house, "tags": nested(64)}, "footprint").tags == nested(64)
+    for levels in (65, 480, 900):
+        with pytest.raises(InvalidInput, match="nested too deeply") as caught:
+            decode({**house, "tags": nested(levels)}, "footprint")
+        assert caught.value.place.pointer == "/tags"

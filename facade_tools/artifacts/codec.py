@@ -13,10 +13,14 @@ from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any, TypeVar, Union, get_args, get_origin
 
+from ..errors import InvalidInput
 from .numbers import Given
+from .pointers import escaped
 
 T = TypeVar("T")
 Convert = Callable[[Any], Any]
+
+MOST_NESTED = 64  # levels of a free field: deeper ones exhaust the stack of who writes them
 
 _PLAIN = frozenset({float, int, str, bool, Given, type(None)})
 
@@ -24,10 +28,30 @@ _PLAIN = frozenset({float, int, str, bool, Given, type(None)})
 def from_json(cls: type[T], document: Mapping[str, Any]) -> T:
     """Build the dataclass `cls` from schema-checked JSON data.
 
-    Keys that are no field are ignored; null stands for the field's default.
+    Keys that are no field are ignored; null stands for the field's default. Raises InvalidInput,
+    with the pointer to the document's own field, where a free one is nested too deeply.
     """
     decoder = _object_decoder(typing.cast("Any", cls))
-    return decoder(document)  # type: ignore[no-any-return]
+    try:
+        return decoder(document)  # type: ignore[no-any-return]
+    except _TooDeep:
+        nested = {name: item for name, item in document.items() if type(item) in (dict, list)}
+        name = next(name for name, item in nested.items() if _deep(item, MOST_NESTED))
+        message = f"is nested too deeply; expected at most {MOST_NESTED} levels"
+        raise InvalidInput(message, pointer=f"/{escaped(name)}") from None
+
+
+class _TooDeep(Exception):
+    """A free field with too many levels."""
+
+
+def _deep(items: Any, levels: int) -> bool:
+    """Tell whether a list or object of JSON data has more than so many levels, itself counted."""
+    for item in items.values() if type(items) is dict else items:
+        kind = type(item)
+        if (kind is dict or kind is list) and (levels <= 1 or _deep(item, levels - 1)):
+            return True
+    return False
 
 
 def to_json(value: Any) -> Any:
@@ -137,6 +161,15 @@ def _tuple_decoder(arguments: tuple[Any, ...]) -> Convert:
 
 def _mapping_decoder(value_hint: Any) -> Convert:
     decode = _decoder(value_hint)
+    if value_hint in (Any, object):
+        return _free
     if decode is None:
         return dict
     return lambda items: {key: decode(item) for key, item in items.items()}
+
+
+def _free(items: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a free field as it is. Raises _TooDeep."""
+    if _deep(items, MOST_NESTED):
+        raise _TooDeep
+    return dict(items)

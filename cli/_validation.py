@@ -24,6 +24,8 @@ RULES = {
     "attributes": "facade_tools.exteriors.relations:contradictions",
     "blocks": "facade_tools.stylization.bases:blocks_problems",
     "building": "facade_tools.geometry.checks:building_problems",
+    "footprint": "facade_tools.geometry.checks_plan:footprint_problems",
+    "parse": "facade_tools.geometry.checks_plan:parse_problems",
     "derivation": "facade_tools.reconstruction.records:derivation_problems",
     "layout": "facade_tools.layering.assets:layout_problems",
     "stylesheet": "facade_tools.formats.style_folder:sheet_problems",

@@ -19,9 +19,11 @@ from facade_tools.artifacts.building import (
     Roof,
     Side,
 )
+from facade_tools.artifacts.footprint import Footprint
 from facade_tools.artifacts.store import read
 from facade_tools.geometry.blocked import BuiltRoof, blocked_rectangles, porch_posts, roof_height
 from facade_tools.geometry.checks import Problem, building_problems
+from facade_tools.geometry.checks_plan import footprint_problems, parse_problems
 from facade_tools.geometry.pieces import facade_pieces
 
 SAMPLES = Path(__file__).parent.parent / "sample_data"
@@ -161,6 +163,34 @@ FAULTS: dict[str, tuple[Callable[[Building], Building], str, str]] = {
         "/facades/front/pieces/0/elements/2",
         "head is 0.20 m below",
     ),
+    "sill too high": (
+        lambda b: with_front(
+            b, lambda p: replace(p, elements=(DOOR, replace(WINDOW, v=2.3, height=0.5)))
+        ),
+        "/facades/front/pieces/0/elements/1",
+        "sill is 2.30 m",
+    ),
+    "main door is a window": (
+        lambda b: with_front(b, lambda p: replace(p, elements=(replace(WINDOW, main=True),))),
+        "/facades/front/pieces/0/elements/0",
+        "no door at ground level",
+    ),
+    "main door upstairs": (
+        lambda b: replace(
+            b,
+            facades={
+                **b.facades,
+                "front": Facade(
+                    (
+                        replace(b.facades["front"].pieces[0], elements=()),
+                        replace(b.facades["front"].pieces[1], elements=(DOOR,)),
+                    )
+                ),
+            },
+        ),
+        "/facades/front/pieces/1/elements/0",
+        "no door at ground level",
+    ),
     "hanging door": (
         lambda b: with_front(b, lambda p: replace(p, elements=(replace(DOOR, v=0.6),))),
         "/facades/front/pieces/0/elements/0",
@@ -174,6 +204,94 @@ def test_planted_fault_is_found(fault: str) -> None:
     plant, pointer, words = FAULTS[fault]
     found = problems(plant(house()))
     assert any(p.pointer == pointer and words in p.message for p in found), found
+
+
+@pytest.mark.parametrize("fault", FAULTS.keys() - {"no main door", "main door upstairs"})
+def test_planted_fault_is_the_only_one(fault: str) -> None:
+    plant, pointer, _ = FAULTS[fault]
+    beside = {"piece of no box", "wrong wall", "box id twice"}  # leave other walls over, too
+    found = {p.pointer for p in problems(plant(house()))}
+    assert pointer in found
+    assert fault in beside or found == {pointer}
+
+
+def test_wall_of_another_box_is_found() -> None:
+    wing = Box("wing", "general", 12, 4, 4, 6, 2.8, Roof("flat"))
+    sound = house(wing)
+    assert problems(sound) == []
+    broken = with_front(sound, lambda p: replace(p, box="wing" if p.box == "main" else "main"))
+    pointer = "/facades/front/pieces/0/box"
+    assert [p.pointer for p in problems(broken)] == [pointer]
+
+
+def test_garage_door_outside_the_garage_is_found() -> None:
+    garage = Box("garage", "garage", 13, 4, 6, 6, 2.7, Roof("flat"))
+    door = Element("garage-door", "panel", 0.5, 0.0, 2.4, 2.1)
+    sound = house(garage)
+    pieces = {s: list(f.pieces) for s, f in sound.facades.items()}
+
+    def with_door(box: str) -> Building:
+        j = next(j for j, p in enumerate(pieces["back"]) if p.box == box and p.origin[2] == 0.0)
+        back = [
+            replace(p, elements=(door,) if i == j else ()) for i, p in enumerate(pieces["back"])
+        ]
+        return replace(sound, facades={**sound.facades, "back": Facade(tuple(back))})
+
+    assert problems(with_door("garage")) == []
+    found = [p.message for p in problems(with_door("main"))]
+    assert "a garage door in box 'main', no garage" in found
+
+
+RECTANGLE = ((0.0, 0.0), (8.0, 0.0), (8.0, 6.0), (0.0, 6.0))
+HOLE = ((1.0, 1.0), (1.0, 3.0), (3.0, 3.0), (3.0, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("rings", "pointer", "words"),
+    [
+        ((((0, 0), (8, 6), (8, 0), (0, 6)),), "/polygon/0", "crosses itself"),
+        ((((0, 0), (8, 0), (4, 0)),), "/polygon/0", "no area"),
+        ((RECTANGLE, ((1, 1), (1, 1), (1, 1))), "/polygon/1", "no area"),
+        ((RECTANGLE, ((6, 2), (10, 2), (10, 4), (6, 4))), "/polygon/1", "4 m² outside"),
+        ((RECTANGLE, HOLE, ((2, 2), (5, 2), (5, 5), (2, 5))), "/polygon/2", "/polygon/1 by 1 m²"),
+        ((RECTANGLE, RECTANGLE[::-1]), "/polygon", "no area"),
+    ],
+)
+def test_footprint_whose_rings_are_no_plan_is_found(rings, pointer, words) -> None:
+    found = list(footprint_problems(Footprint("f", rings, 5.0)))
+    assert [p.pointer for p in found] == [pointer]
+    assert words in found[0].message
+
+
+@pytest.mark.parametrize(
+    "rings",
+    [
+        (RECTANGLE,),
+        (RECTANGLE[::-1], HOLE),
+        ((*RECTANGLE, RECTANGLE[0]),),
+        (RECTANGLE, HOLE, tuple((x + 2, y) for x, y in HOLE)),
+    ],
+)
+def test_footprint_of_sound_rings_passes(rings) -> None:
+    assert list(footprint_problems(Footprint("f", rings, 5.0))) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "pointer", "words"),
+    [
+        (lambda rows: rows[:-1], "/regions", "without a label"),
+        (lambda rows: (*rows, rows[0]), "/regions/{last}", "overlaps /regions/0"),
+        (lambda rows: (replace(rows[0], x1=rows[0].x0), *rows[1:]), "/regions/0", "no pixels"),
+        (lambda rows: (*rows, replace(rows[0], x0=-5)), "/regions/{last}", "leaves the image"),
+    ],
+)
+def test_parse_whose_regions_do_not_tile_the_image_is_found(change, pointer, words) -> None:
+    parse = next(iter(read([str(Path(__file__).parent / "golden" / "parses.jsonl")], "parse")))
+    assert list(parse_problems(parse)) == []
+    broken = replace(parse, regions=change(parse.regions))
+    found = list(parse_problems(broken))
+    assert [p.pointer for p in found] == [pointer.format(last=len(parse.regions))]
+    assert words in found[0].message
 
 
 def test_window_in_front_of_a_lower_roof_is_found() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 from collections import Counter
@@ -10,12 +11,15 @@ import pytest
 
 from facade_tools.artifacts.attributes import Attributes
 from facade_tools.errors import InvalidInput
+from facade_tools.formats import xmltree
 from facade_tools.formats.hot2000 import attributes_of, build, detect, eaves_height
 from facade_tools.formats.hot2000_files import house_from_json, house_from_xml
 from facade_tools.formats.reading import ReadOptions, Record
 
 
-def wall(label: str, height: float, perimeter: float, adjacent: bool = False) -> dict[str, object]:
+def wall(
+    label: str, height: float, perimeter: float, adjacent: object = False
+) -> dict[str, object]:
     return {"label": label, "height": height, "perimeter": perimeter, "adjacent": adjacent}
 
 
@@ -167,6 +171,30 @@ def test_an_entity_bomb_is_refused() -> None:
     bomb = b'<?xml version="1.0"?><!DOCTYPE a [<!ENTITY b "c">]><HouseFile>&b;</HouseFile>'
     with pytest.raises(InvalidInput, match="document type"):
         house_from_xml(bomb)
+
+
+@pytest.mark.parametrize("encoding", ["klingon", "shift_jis", "utf-32", "rot13"])
+def test_xml_in_an_encoding_that_cannot_be_read_is_refused(encoding: str) -> None:
+    text = f'<?xml version="1.0" encoding="{encoding}"?><HouseFile/>'.encode()
+    with pytest.raises(InvalidInput, match="cannot be decoded"):
+        house_from_xml(text)
+    with pytest.raises(InvalidInput, match="cannot be decoded"):
+        list(xmltree.iterate(io.BytesIO(text), ["House"]))
+
+
+def test_windows_are_found_however_deep_they_are_nested() -> None:
+    deep = "<Wall>" * 3000 + '<Window number="2"/>' + "</Wall>" * 3000
+    text = f"<HouseFile><House><Specifications/><Components>{deep}</Components></House></HouseFile>"
+    assert [w.parent for w in house_from_xml(text.encode()).windows] == ["Wall"]
+
+
+def test_values_of_another_type_are_unknown_and_no_bug() -> None:
+    row = survey(windows=[window("S", 2.0, 1.5, style=["Picture"])])
+    found = attributes_of(house_from_json(row), "long").artifacts[0]
+    assert found.element.window["fixed"] is None
+    tiny = imported(walls=[wall("Main floor", 2.5, 5e-324), wall("Second level", 2.4, 0.0)])
+    assert tiny[0].facade.wwr == (None,) * 4
+    assert not house_from_json(survey(walls=[wall("a", 2.5, 36.0, "false")])).walls[0].adjacent
 
 
 def test_the_format_is_told_by_content() -> None:

@@ -155,3 +155,9 @@ def test_a_wrong_mapping_is_refused_where_it_is_wrong(
 def test_a_short_row_is_refused() -> None:
     with pytest.raises(InvalidInput, match="columns"):
         rows(TABLE + "3,1\n")
+
+
+def test_broken_utf_16_is_refused() -> None:
+    table = "PID,Order\n1,2\n".encode("utf-16") + b"\x00\xdc\x00\xdc\n\x00"
+    with pytest.raises(InvalidInput, match="UTF-16"):
+        list(assessor.records(io.BytesIO(table), ReadOptions()))

@@ -166,7 +166,14 @@ def _columns_of(text: str, delimiter: str) -> int:
 
 
 def records(stream: BinaryIO, options: ReadOptions) -> Iterator[Record]:
-    """Yield a record a row."""
+    """Yield a record a row. Raises InvalidInput on a table that cannot be read."""
+    try:
+        yield from _rows(stream, options)
+    except UnicodeDecodeError as error:
+        raise InvalidInput(f"is no text in UTF-16: {error.reason}") from None
+
+
+def _rows(stream: BinaryIO, options: ReadOptions) -> Iterator[Record]:
     head = stream.read(HEAD_BYTES)
     stream.seek(0)
     if head[:2] in UTF16:

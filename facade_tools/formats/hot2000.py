@@ -37,6 +37,7 @@ from .hot2000_files import (
 from .reading import Built, Front, ReadOptions, Record, read_whole
 
 WIDEST, TALLEST, MOST = 6.0, 3.0, 20.0  # of one window entry: metres, metres, copies
+LEAST_WALLS = 1.0  # m²: less is no wall
 GLASS_LIMIT = 0.8  # of a side's wall; more is an entry error
 LOWEST_EAVES, HIGHEST_EAVES = 2.0, 12.0  # metres
 LEAST_LEVEL = 1.2  # metres: lower walls are knee walls, headers and dormers' cheeks
@@ -298,7 +299,7 @@ def _unnamed_heights(walls: list[Wall], missing: int) -> list[float]:
 def _glazing(house: House, notes: Counter[str]) -> tuple[Number, ...]:
     """Return window area over a quarter of the exposed wall area: front, back, left, right."""
     wall_area = sum(wall.height * wall.perimeter for wall in _storey_walls(house.walls))
-    if house.front not in COMPASS or wall_area <= 0.0:
+    if house.front not in COMPASS or wall_area < LEAST_WALLS:
         notes["no front direction or no wall: glazing unknown"] += 1
         return (None,) * 4
     glass = [0.0] * 4

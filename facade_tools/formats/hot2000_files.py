@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 from xml.etree.ElementTree import Element
@@ -75,7 +75,7 @@ def house_from_json(row: Mapping[str, Any]) -> House:
             front=str(row["front"]),
             area_above=_number(row.get("area_above")),
             walls=tuple(
-                Wall(str(w["label"]), bool(w["adjacent"]), _n(w["height"]), _n(w["perimeter"]))
+                Wall(str(w["label"]), _true(w["adjacent"]), _n(w["height"]), _n(w["perimeter"]))
                 for w in row["walls"]
             ),
             windows=tuple(map(_window_from_json, row["windows"])),
@@ -97,19 +97,23 @@ def _window_from_json(row: Mapping[str, Any]) -> Window:
         _n(row["w"]),
         _n(row.get("tilt", 90.0)),
         str(row.get("facing", "")),
-        row.get("style"),
+        None if row.get("style") is None else str(row["style"]),
     )
 
 
 def _foundation(row: Mapping[str, Any]) -> Foundation | None:
     exposed = _number(row.get("exposed_perimeter")) or 0.0
-    if str(row.get("isRectangular")).lower() == "true":
+    if _true(row.get("isRectangular")):
         length, width = _number(row.get("length")), _number(row.get("width"))
         if not length or not width:
             return None
         return Foundation(length * width, 2.0 * (length + width), exposed)
     area, perimeter = _number(row.get("area")), _number(row.get("perimeter"))
     return Foundation(area, perimeter, exposed) if area and perimeter else None
+
+
+def _true(value: Any) -> bool:
+    return str(value).lower() in ("true", "1")
 
 
 def _number(value: Any) -> float | None:
@@ -143,7 +147,7 @@ def house_from_xml(data: bytes) -> House:
         front=_direction(said),
         area_above=None if area is None else number(area.get("aboveGrade")),
         walls=tuple(map(_wall, components.findall("Wall"))),
-        windows=tuple(_windows(components, "", styles)),
+        windows=tuple(_windows(components, styles)),
         foundations=tuple(
             filter(None, (_ground_floor(e) for name in FOUNDATIONS for e in components.iter(name)))
         ),
@@ -160,7 +164,7 @@ def _direction(element: Element) -> str:
 def _wall(element: Element) -> Wall:
     measures = element.find("Measurements")
     get = (lambda _: None) if measures is None else measures.get
-    adjacent = element.get("adjacentEnclosedSpace") == "true"
+    adjacent = _true(element.get("adjacentEnclosedSpace"))
     return Wall(text(element, "Label"), adjacent, _n(get("height")), _n(get("perimeter")))
 
 
@@ -174,15 +178,16 @@ def _window_styles(root: Element) -> dict[str, str]:
     return styles
 
 
-def _windows(element: Element, parent: str, styles: Mapping[str, str]) -> list[Window]:
-    found = []
-    for child in element:
-        if child.tag == "Window":
-            found.append(_window(child, parent, styles))
-        else:
-            inner = parent if child.tag == "Components" else child.tag
-            found += _windows(child, inner, styles)
-    return found
+def _windows(components: Element, styles: Mapping[str, str]) -> Iterator[Window]:
+    """Yield the windows in their order; a stranger's elements may be nested without end."""
+    left = [(child, "") for child in reversed(components)]
+    while left:
+        element, parent = left.pop()
+        if element.tag == "Window":
+            yield _window(element, parent, styles)
+            continue
+        inner = parent if element.tag == "Components" else element.tag
+        left += [(child, inner) for child in reversed(element)]
 
 
 def _window(element: Element, parent: str, styles: Mapping[str, str]) -> Window:

@@ -23,6 +23,8 @@ def parse(data: bytes) -> Element:
         raise _broken(error) from None
     except DefusedXmlException:
         raise InvalidInput("declares a document type or an entity; expected plain XML") from None
+    except (LookupError, ValueError) as error:  # an encoding that Python lacks, or of many bytes
+        raise InvalidInput(f"cannot be decoded: {error}; expected XML in UTF-8") from None
     for element in root.iter():
         element.tag = local(element.tag)
     return root
@@ -51,6 +53,8 @@ def iterate(stream: BinaryIO, names: Collection[str]) -> Iterator[Element]:
         raise _broken(error) from None
     except DefusedXmlException:
         raise InvalidInput("declares a document type or an entity; expected plain XML") from None
+    except (LookupError, ValueError) as error:  # an encoding that Python lacks, or of many bytes
+        raise InvalidInput(f"cannot be decoded: {error}; expected XML in UTF-8") from None
 
 
 def _broken(error: ParseError) -> InvalidInput:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..artifacts.building import SIDES, Building, Element, Piece, Side
+from ..artifacts.building import SIDES, Box, Building, Element, Piece, Side
 from .arrays import Booleans, Rectangles
 from .blocked import BuiltRoof, blocked_rectangles
 from .floors import TOLERANCE
@@ -103,9 +103,11 @@ def _piece_problems(building: Building) -> Iterator[Problem]:
     for side, facade in building.facades.items():
         rest = {_key(piece): piece for piece in made[side]}
         for j, piece in enumerate(facade.pieces):
+            pointer = f"/facades/{side}/pieces/{j}"
             if not _take(rest, piece):
-                pointer = f"/facades/{side}/pieces/{j}"
                 yield Problem(pointer, f"{piece.id!r} is no exterior wall that the boxes make")
+            elif not any(_bears(box, side, piece) for box in building.boxes):
+                yield Problem(f"{pointer}/box", f"the wall is none of box {piece.box!r}")
         if not building.partial:
             for piece in rest.values():
                 where = ", ".join(f"{value:g}" for value in piece.origin)
@@ -113,6 +115,22 @@ def _piece_problems(building: Building) -> Iterator[Problem]:
                 yield Problem(
                     f"/facades/{side}/pieces", f"the wall at ({where}), {size}, is missing"
                 )
+
+
+def _bears(box: Box, side: Side, piece: Piece) -> bool:
+    """Tell whether a box is the one that a piece names and has a wall of that side there."""
+    along, across = (0, 1) if side in ("front", "back") else (1, 0)
+    centre, size = (box.x, box.y), (box.width, box.depth)
+    outward = 1 if side in ("back", "right") else -1
+    plane = centre[across] + outward * size[across] / 2
+    turned = -1 if side in ("back", "left") else 1  # u runs to the right as seen from outside
+    ends = sorted((piece.origin[along], piece.origin[along] + turned * piece.width))
+    low, high = centre[along] - size[along] / 2, centre[along] + size[along] / 2
+    return (
+        box.id == piece.box
+        and abs(plane - piece.origin[across]) <= NEAR
+        and min(ends[1], high) - max(ends[0], low) > NEAR
+    )
 
 
 _Key = tuple[int, ...]

@@ -23,12 +23,14 @@ from .kernels_columns import advanced, column_hash, contradicts, occluded
 from .kernels_labels import (
     AFTER,
     ALIVE,
+    BARE,
     BEAM,
     BEST,
     BUDGET,
     COLUMNS,
     COMPLETE,
     DEPTH,
+    EXPANDED,
     HAS_GRIPS,
     HIGH,
     IS_SOLID,
@@ -126,11 +128,13 @@ def search(  # noqa: C901 - one flat loop: a compiled call a row would cost more
     code, grip = np.zeros(m, np.int64), np.zeros((max(wide, 1), 2), np.int64)
     for progress in range(total):  # Σ letters consumed
         bar = beam_bar(bucket[progress], chain, head, labels, limits[BEAM], status)
-        state = bucket[progress]
+        state, grown = bucket[progress], False
         while state >= 0:
             label = head[state]
             while label >= 0:
-                if labels[label, ALIVE] and labels[label, OMEGA] <= bar:
+                if labels[label, ALIVE] == 1 and labels[label, OMEGA] <= bar:
+                    labels[label, ALIVE] = EXPANDED
+                    grown = True
                     spare = limits[BUDGET] - labels[label, OMEGA]
                     k = 0
                     option[0] = -1
@@ -234,6 +238,9 @@ def search(  # noqa: C901 - one flat loop: a compiled call a row would cost more
                         option[k] = -1
                 label = labels[label, NEXT]
             state = chain[state]
+            if state < 0 and grown and limits[LOOSE] == BARE and limits[SPLITS]:
+                # A column of pieces alone consumes no letter: its labels are in this bucket, too.
+                state, grown = bucket[progress], False
         if status[STEPS] > limits[MAX_STEPS]:
             break
     status[BEST] = best_label(

@@ -37,6 +37,8 @@ def advanced(
     """
     progress = np.int64(0)
     fewest = np.int64(2**62)
+    # Without an opaque substring, a column may be as wide as its transparent ones bear.
+    upper, lower = max(upper, lower), min(upper, lower)
     for r in range(m):
         here, been = before[r] >> 2, (before[r] >> 1) & 1
         there = here if taken[r] < 0 else steps[taken[r], TO_PLACE]

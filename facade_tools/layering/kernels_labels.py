@@ -10,6 +10,7 @@ from ..compiled import compiled
 
 # Columns of the label table.
 OMEGA, SIGMA, PIECES, COLUMNS, PARENT, STATE, NEXT, ALIVE = range(8)
+EXPANDED = 2  # a value of ALIVE: what can follow the label has been tried
 # Entries of `limits`. LOOSE: columns need no opaque substring; BARE: only Ω counts, no ties.
 # RIVAL: an Ω that is known, with MORE columns: what only ties must have as many.
 BUDGET, WIDEST, CANVAS, SPLITS, MAX_STEPS, BEAM, LOOSE, FLOOR, SHORTEST, RIVAL, MORE = range(11)
@@ -69,7 +70,7 @@ def beam_bar(state: int, chain: Array, head: Array, labels: Array, beam: int, st
     while at >= 0:
         label = head[at]
         while label >= 0:
-            count += labels[label, ALIVE]
+            count += labels[label, ALIVE] > 0
             label = labels[label, NEXT]
         at = chain[at]
     if count <= beam:

@@ -225,7 +225,21 @@ class Generator:
         return sum(self.direction.rules[letter.symbol].size or 0.0 for letter in word)
 
     def bounds(self, words: Sequence[Word]) -> list[Bounds]:
-        """Return eq. 7 of every word; the lower bound, too, is eased by the tolerance."""
+        """Return eq. 7 of every word; the lower bound, too, is eased by the tolerance.
+
+        The slack admits words, but unsized symbols do without it where they can: an Ω that is
+        smaller by the slack alone would go before what ties with it.
+        """
+        eased = self._eq7(words, self.slack)
+        if not any(row.counts for row in eased):
+            return eased
+        exact = [
+            strict if strict.counts else row
+            for strict, row in zip(self._eq7(words, 0.0), eased, strict=True)
+        ]
+        return eased if self._box(exact) is None else exact
+
+    def _eq7(self, words: Sequence[Word], slack: float) -> list[Bounds]:
         out = []
         opaque = 0.0
         for layer, word in enumerate(words):
@@ -234,14 +248,17 @@ class Generator:
             for letter in word:
                 if self.direction.rules[letter.symbol].size is None:
                     counts[letter.symbol] = counts.get(letter.symbol, 0) + 1
-            least = self.canvas - self.tolerance - opaque - self.slack
-            out.append(Bounds(self.known(word), tuple(counts.items()), least, self.limit))
+            least = self.canvas - self.tolerance - opaque - slack
+            most = self.canvas + self.tolerance + slack
+            out.append(Bounds(self.known(word), tuple(counts.items()), least, most))
             opaque += self.direction.opaque_size(word)
         return out
 
     def box(self, words: Sequence[Word]) -> tuple[tuple[str, float, float], ...] | None:
         """Return the ranges of the unsized symbols' sizes; None where eq. 7 cannot hold."""
-        bounds = self.bounds(words)
+        return self._box(self.bounds(words))
+
+    def _box(self, bounds: Sequence[Bounds]) -> tuple[tuple[str, float, float], ...] | None:
         least = LEAST_UNSIZED * self.canvas
         names = sorted({name for row in bounds for name, _ in row.counts})
         box = dict.fromkeys(names, (least, self.limit))

@@ -74,8 +74,8 @@ class PairBounds:
     def exceed(self, candidate: Candidate, tolerance: float, splits: bool, budget: float) -> bool:
         """Tell whether some two layers alone need a greater Ω than the budget (m)."""
         box = {name: (low, high) for name, low, high in candidate.unsized}
-        most = self.maker.scale.down(budget + SLACK * self.direction.canvas)
-        widest = self._limits(tolerance)[1]
+        most, widest = self._limits(tolerance)
+        most = min(most, self.maker.scale.down(budget + SLACK * self.direction.canvas))
         for first, end in candidate.split():
             pairs = _pairs(candidate.lattices[first:end])
             if any(

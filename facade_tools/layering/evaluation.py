@@ -270,6 +270,11 @@ class _Programme:
             total[first + start : first + end] = 1.0
             rows.append(total)
             tops.append(self.limit)
+            if len(self.path.candidate.parts) > 1:  # each group keeps to µ
+                error = total.copy()
+                error[first + columns + start : first + columns + end] = -1.0
+                rows.append(error)
+                tops.append(self.limit - self.direction.canvas)
         for bound in self.bounds:
             line = np.zeros(width)
             for name, times in bound.counts:

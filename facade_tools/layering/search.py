@@ -183,7 +183,7 @@ class GroupSearch:
         )
         for stage in STAGES[-2:]:
             self.clock = whole.share(0.25)
-            budget = stage.tolerance * self.direction.canvas
+            budget = self._budget(stage.tolerance)
             rng = item_generator(1, "layer-solve", *self.groups)
             for candidate in self._sampled(stage.tolerance):
                 found = None
@@ -204,7 +204,7 @@ class GroupSearch:
         self, candidates: Iterator[Candidate], stage: Stage, best: Alignment | None
     ) -> Alignment | None:
         """Return the best of what beams find among candidates, while the clock lets them."""
-        budget = stage.tolerance * self.direction.canvas
+        budget = self._budget(stage.tolerance)
         for candidate in candidates:
             if self.clock.over():
                 break
@@ -235,12 +235,16 @@ class GroupSearch:
                 return
         self._kept[tolerance] = kept, generator
 
+    def _budget(self, tolerance: float) -> float:
+        """Return the greatest Ω (m) at a tolerance: µ for each of the groups."""
+        return tolerance * self.direction.canvas * len(self.groups)
+
     def at(self, stage: Stage) -> Found:
         """Return the best alignment at one tolerance, with or without splits."""
         complete = True
         cleared = 0.0  # no alignment has a smaller Ω
         for share in BUDGETS:
-            budget = share * stage.tolerance * self.direction.canvas
+            budget = share * self._budget(stage.tolerance)
             found = self._within(stage, budget)
             complete = complete and found.complete
             cleared = max(cleared, found.bound) if complete else cleared
@@ -279,7 +283,7 @@ class GroupSearch:
         for candidate in self.candidates(tolerance):
             if self.clock.over():
                 return
-            budget = tolerance * self.direction.canvas
+            budget = self._budget(tolerance)
             found = self._align(candidate, stage, budget, self.effort)
             if found.alignment is not None:
                 yield found.alignment

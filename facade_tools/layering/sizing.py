@@ -192,7 +192,11 @@ def feasible(equations: System, keep: NDArray[np.bool_] | None = None) -> bool:
 
 
 def conflict(direction: Direction, alignments: Sequence[Alignment]) -> list[Tag] | None:
-    """Return None if a sizing exists; otherwise columns of which not all can be had together."""
+    """Return None if a sizing exists; otherwise columns of which not all can be had together.
+
+    Those are all columns where it takes them all: the groups' sums, or a letter without further
+    pieces.
+    """
     if all(al.omega == 0.0 and not al.sizes and not al.pieces for al in alignments[:1]) and (
         len(alignments) == 1
     ):
@@ -200,6 +204,9 @@ def conflict(direction: Direction, alignments: Sequence[Alignment]) -> list[Tag]
     equations = system(direction, alignments)
     if feasible(equations):
         return None
+    equations = _anywhere(equations)
+    if feasible(equations):
+        return [(i, j) for i, one in enumerate(alignments) for j in range(one.count)]
     tags = np.array(equations.tags)
     keep = np.ones(len(tags), dtype=bool)
     needed = []
@@ -210,6 +217,25 @@ def conflict(direction: Direction, alignments: Sequence[Alignment]) -> list[Tag]
         else:
             keep = without
     return needed
+
+
+def _anywhere(equations: System) -> System:
+    """Return what columns ask for in whatever alignment they stand.
+
+    Others may sum up to the canvas differently, and cut a letter into more pieces.
+    """
+    of_columns = np.array(equations.tags)[:, 1] >= 0
+    keep = of_columns | (equations.right == 0.0)
+    letters = np.flatnonzero(keep & ~of_columns)
+    more = np.zeros((len(keep), len(letters)))
+    more[letters, np.arange(len(letters))] = 1.0
+    return replace(
+        equations,
+        matrix=np.hstack([equations.matrix, more])[keep],
+        right=equations.right[keep],
+        tags=tuple(tag for tag, kept in zip(equations.tags, keep, strict=True) if kept),
+        least=np.concatenate([equations.least, np.zeros(len(letters))]),
+    )
 
 
 def solve(direction: Direction, alignments: Sequence[Alignment]) -> Sizing:

@@ -112,18 +112,18 @@ def add_label(
             reach[fresh, r, 0] = grip[r, 0] if held else 0
             reach[fresh, r, 1] = grip[r, 1] if held else 0
         rest = max(rest, places[there, REST] - places[there, LEAST])
-    full = sigma + rest >= limits[CANVAS]
+    ample = limits[CANVAS] - rest  # a Σ that will reach the canvas
     other, before = head[target], np.int64(-1)
     while other >= 0:
         after = labels[other, NEXT]
         if labels[other, ALIVE]:
             if better(
-                other, fresh, m, labels, reach, codes, full, limits, places, first, steps,
+                other, fresh, m, labels, reach, codes, ample, limits, places, first, steps,
                 spelling,
             ):  # fmt: skip
                 return
             if better(
-                fresh, other, m, labels, reach, codes, full, limits, places, first, steps,
+                fresh, other, m, labels, reach, codes, ample, limits, places, first, steps,
                 spelling,
             ):  # fmt: skip
                 labels[other, ALIVE] = 0
@@ -141,7 +141,7 @@ def add_label(
 
 @compiled
 def better(
-    a: int, b: int, m: int, labels: Array, reach: Array, codes: Array, full: bool, limits: Array,
+    a: int, b: int, m: int, labels: Array, reach: Array, codes: Array, ample: int, limits: Array,
     places: Array, first: Array, steps: Array, spelling: Any,
 ) -> bool:  # fmt: skip
     """Tell whether whatever completes label b completes label a at least as well."""
@@ -162,7 +162,7 @@ def better(
     if labels[a, COLUMNS] != labels[b, COLUMNS]:
         return bool(labels[a, COLUMNS] > labels[b, COLUMNS])
     if labels[a, SIGMA] < labels[b, SIGMA]:
-        return full
+        return bool(labels[a, SIGMA] >= ample)
     return not named_before(b, a, m, labels, codes, places, first, steps, spelling)
 
 

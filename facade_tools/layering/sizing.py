@@ -7,7 +7,7 @@ s and t follow. Solved exactly by an active-set method (daqp).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -204,7 +204,7 @@ def conflict(direction: Direction, alignments: Sequence[Alignment]) -> list[Tag]
     equations = system(direction, alignments)
     if feasible(equations):
         return None
-    equations = _anywhere(equations)
+    equations = _anywhere(equations, direction, alignments)
     if feasible(equations):
         return [(i, j) for i, one in enumerate(alignments) for j in range(one.count)]
     tags = np.array(equations.tags)
@@ -219,23 +219,48 @@ def conflict(direction: Direction, alignments: Sequence[Alignment]) -> list[Tag]
     return needed
 
 
-def _anywhere(equations: System) -> System:
-    """Return what columns ask for in whatever alignment they stand.
+def _anywhere(equations: System, direction: Direction, alignments: Sequence[Alignment]) -> System:
+    """Return what columns ask for in whatever alignment of the same words they stand.
 
-    Others may sum up to the canvas differently, and cut a letter into more pieces.
+    Others may sum up to the canvas differently, and cut a letter into more pieces. Of groups, whose
+    sums bind one another, no word is longer than the canvas, and opaque letters cover it.
     """
     of_columns = np.array(equations.tags)[:, 1] >= 0
     keep = of_columns | (equations.right == 0.0)
     letters = np.flatnonzero(keep & ~of_columns)
     more = np.zeros((len(keep), len(letters)))
     more[letters, np.arange(len(letters))] = 1.0
+    matrix = np.hstack([equations.matrix, more])[keep]
+    tags = [tag for tag, kept in zip(equations.tags, keep, strict=True) if kept]
+    sums = list(_sums(equations, direction, alignments)) if len(alignments) > 1 else []
+    size, count = matrix.shape[1], len(sums)
+    wide = np.zeros((count, size + count))
+    for row, (line, (i, counts, sign)) in enumerate(zip(wide, sums, strict=True)):
+        line[: len(counts)], line[size + row] = counts, sign
+        tags.append((i, -1))
     return replace(
         equations,
-        matrix=np.hstack([equations.matrix, more])[keep],
-        right=equations.right[keep],
-        tags=tuple(tag for tag, kept in zip(equations.tags, keep, strict=True) if kept),
-        least=np.concatenate([equations.least, np.zeros(len(letters))]),
+        matrix=np.vstack([np.hstack([matrix, np.zeros((len(matrix), count))]), wide]),
+        right=np.concatenate([equations.right[keep], np.ones(count)]),
+        tags=tuple(tags),
+        least=np.concatenate([equations.least, np.zeros(len(letters) + count)]),
     )
+
+
+def _sums(
+    equations: System, direction: Direction, alignments: Sequence[Alignment]
+) -> Iterator[tuple[int, Floats, float]]:
+    """Yield (group, letters of each symbol, sign of what is left beside the canvas)."""
+    names = equations.names
+    for i, alignment in enumerate(alignments):
+        opaque = np.zeros(len(names))
+        for word in alignment.candidate.words:
+            counts = np.zeros(len(names))
+            for letter in word:
+                counts[names.index(letter.symbol)] += 1.0
+                opaque[names.index(letter.symbol)] += float(direction.is_opaque(letter))
+            yield i, counts, 1.0
+        yield i, opaque, -1.0
 
 
 def solve(direction: Direction, alignments: Sequence[Alignment]) -> Sizing:

@@ -1,7 +1,7 @@
 """How long `layer-solve` takes, and how far it agrees with the brute force of the tests.
 
-Usage: python benchmarks/bench_layer_solve.py [--hard] [--oracle N] [--first SEED]; without either,
-the sample designs. Seconds are of CPU time.
+Usage: python benchmarks/bench_layer_solve.py [--hard] [--oracle N] [--language N] [--first SEED];
+without any, the sample designs. Seconds are of CPU time.
 """
 
 from __future__ import annotations
@@ -12,14 +12,17 @@ import resource
 import sys
 import time
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tests"))
 
-from layering_checks import broken  # noqa: E402
+from layering_checks import compared  # noqa: E402
 from layering_designs import random_direction, words_of  # noqa: E402
-from layering_oracle import TooLarge, best  # noqa: E402
+from layering_language import drawn  # noqa: E402
+from layering_oracle import TooLarge, best, best_of  # noqa: E402
 
 from facade_tools.artifacts.store import read_one  # noqa: E402
 from facade_tools.layering.alignment import prepare  # noqa: E402
@@ -30,6 +33,7 @@ from facade_tools.layering.solve import solve_design  # noqa: E402
 
 PAPER_26_LAYERS = 1.0  # seconds, IMAW15
 PATIENCE = 10  # times more than the brute force has in the tests
+HASTE = 0.2  # the same, of designs of the whole language
 
 
 def samples() -> None:
@@ -111,7 +115,50 @@ def oracle(count: int, first: int, seconds: float) -> None:
     print(f"{count} designs:", ", ".join(f"{n} {what}" for what, n in verdicts.items()))
 
 
-def brute_force(problem: Direction) -> tuple[float, ...] | None:
+def language(count: int, first: int, seconds: float) -> None:
+    """Compare random designs of the whole language with the brute force, names included.
+
+    One direction of each: substituted patterns, reflections, counters, unsized symbols, splits,
+    groups, and words that the brute force reads off the texts itself.
+    """
+    verdicts, seen = Counter[str](), Counter[str]()
+    for seed in range(first, first + count):
+        design = drawn(seed)
+        for groups, tuples, layers in design.searches():
+            try:
+                expected = best_of(design.problem, tuples, HASTE, layers)
+            except TooLarge:
+                verdicts["too large for the brute force"] += 1
+                continue
+            clock = Clock(time.process_time() + seconds, now=time.process_time)
+            search = GroupSearch(design.problem, groups, clock, few=0 if seed % 2 else 6)
+            found = search.answer()
+            verdict = compared(design.problem, expected, found, search.exhausted)
+            verdicts[verdict] += 1
+            seen.update(features(groups, found))
+            if verdict != "equal":
+                print(f"seed {seed}, {groups}: {verdict}: brute force {expected}", flush=True)
+        if (seed + 1) % 100 == 0:
+            print(f"… {seed}: {dict(verdicts)}", flush=True)
+    for what, counts in ((f"{count} designs", verdicts), ("of the answers", seen)):
+        print(f"{what}:", ", ".join(f"{n} {name}" for name, n in counts.items()))
+
+
+def features(groups: tuple[str, ...], found: Answer | None) -> Iterator[str]:
+    """Yield what is hard about an answer."""
+    if found is None:
+        yield "without a layout"
+        return
+    one = found.alignment
+    if one.candidate.unsized:
+        yield "with unsized symbols"
+    if one.pieces:
+        yield "with splits"
+    if len(groups) > 1:
+        yield "of groups together"
+
+
+def brute_force(problem: Direction) -> tuple[Any, ...] | None:
     """Return the brute force's answer, however long it takes within reason."""
     words = [words_of(problem, row) for row in problem.groups["default"]]
     try:
@@ -120,35 +167,20 @@ def brute_force(problem: Direction) -> tuple[float, ...] | None:
         return best(problem, words, PATIENCE)
 
 
-def compared(
-    problem: Direction, expected: tuple[float, ...] | None, found: Answer | None, exhausted: bool
-) -> str:
-    """Return how an answer relates to the brute force's."""
-    if found is None:
-        if exhausted:
-            return "equal" if expected is None else "WRONG"
-        return "not answered in time"
-    one = found.alignment
-    if expected is None or list(broken(problem, one)):
-        return "WRONG"
-    same = one.tolerance == expected[0] and abs(one.omega - expected[1]) < 2e-6
-    same = same and (one.pieces, one.count) == tuple(expected[2:4])
-    if not found.optimal:
-        return "answered, not proved"
-    return "equal" if same else "WRONG"
-
-
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--oracle", type=int, default=0, help="random designs to compare")
+    parser.add_argument("--language", type=int, default=0, help="the same, of the whole language")
     parser.add_argument("--first", type=int, default=0, help="seed of the first design")
     parser.add_argument("--hard", action="store_true", help="30 under-constrained designs")
     parser.add_argument("--seconds", type=float, default=10.0, help="time limit of each of them")
     options = parser.parse_args()
     prepare()
-    if not (options.oracle or options.hard):
+    if not (options.oracle or options.language or options.hard):
         samples()
     if options.hard:
         hard(options.seconds, options.first)
     if options.oracle:
         oracle(options.oracle, options.first, options.seconds)
+    if options.language:
+        language(options.language, options.first, options.seconds)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
-from layering_oracle import Cell, admitted, error, sizable
+from layering_oracle import Cell, admitted, error, names, sizable
 from scipy.optimize import nnls
 
 
@@ -51,22 +51,57 @@ def cells_of(alignment):
 
 def broken(direction, alignment):
     """What is wrong with a solver's alignment; nothing should be."""
-    words, columns = alignment.candidate.words, cells_of(alignment)
+    parts = [alignment.part(i) for i in range(len(alignment.candidate.parts))]
+    groups = [(part.candidate.words, cells_of(part)) for part in parts]
     mu = alignment.tolerance * direction.canvas
-    if not admitted(direction, words, mu):
+    if not admitted(direction, alignment.candidate.words, mu, alignment.candidate.parts):
         yield "eq. 7"
-    for row, word in enumerate(words):
-        letters = [c.letter for column in columns for c in column[row]]
-        if sorted(set(letters)) != list(range(len(word))) or letters != sorted(letters):
-            yield f"row {row} is not its word"
-    for before, column in zip([None, *columns], columns):
-        if not any(column) or not allowed(direction, words, column, before):
-            yield "a constraint of 5.2"
-    value = error(direction, words, columns, mu)
+    for words, columns in groups:
+        for row, word in enumerate(words):
+            letters = [c.letter for column in columns for c in column[row]]
+            if sorted(set(letters)) != list(range(len(word))) or letters != sorted(letters):
+                yield f"row {row} is not its word"
+        for before, column in zip([None, *columns], columns):
+            if not any(column) or not allowed(direction, words, column, before):
+                yield "a constraint of 5.2"
+    value = error(direction, groups, mu)
     if value is None or abs(value[0] - alignment.omega) > 2e-6:
         yield f"error {alignment.omega}, should be {value}"
-    if not sizable(direction, words, columns):
+    if not sizable(direction, groups):
         yield "no sizes"
+
+
+def compared(direction, expected, found, exhausted):
+    """How a search's answer relates to the brute force's: "equal", or in what it is worse.
+
+    expected: of `best_of`, or None. found: an answer, or None. exhausted: whether none is proved.
+    """
+    if found is None:
+        if exhausted:
+            return "equal" if expected is None else "WRONG: there is a layout"
+        return "not answered in time"
+    one = found.alignment
+    if expected is None:
+        return "WRONG: there is no layout"
+    if wrong := list(broken(direction, one)):
+        return f"WRONG: {wrong}"
+    if not found.optimal:
+        return "answered, not proved"
+    if found.gap:
+        return "WRONG: proved, with a gap"
+    share, omega, pieces, count, off, layout = expected
+    if (one.tolerance, one.pieces, one.count) != (share, pieces, count):
+        return "WRONG: tolerance, pieces or columns"
+    if abs(one.omega - omega) > 2e-6:
+        return "WRONG: error"
+    parts = len(one.candidate.parts)
+    if one.candidate.unsized or parts > 1:
+        return "equal"
+    if abs(abs(one.sigma - direction.canvas) - off) > 2e-6:
+        return "WRONG: sum of the columns"
+    if one.pieces == 0 and names([(one.candidate.words, cells_of(one))]) != layout:
+        return "WRONG: names"
+    return "equal"
 
 
 def reference_sizes(direction, alignments):

@@ -57,11 +57,13 @@ def unsized_and_known(direction, word):
     return counts, known
 
 
-def eq7(direction, words, mu):
-    """Rows (counts, known, least, greatest) of eq. 7."""
+def eq7(direction, words, mu, parts=()):
+    """Rows (counts, known, least, greatest) of eq. 7; parts: layers of each alignment group."""
     slack = 1e-9 * direction.canvas
     rows, opaque = [], 0.0
-    for word in words:
+    tops = set(itertools.accumulate(parts))
+    for layer, word in enumerate(words):
+        opaque = 0.0 if layer in tops else opaque
         counts, known = unsized_and_known(direction, word)
         rows.append(
             (counts, known, direction.canvas - mu - opaque - slack, direction.canvas + mu + slack)
@@ -74,8 +76,8 @@ def eq7(direction, words, mu):
     return rows
 
 
-def admitted(direction, words, mu):
-    rows = eq7(direction, words, mu)
+def admitted(direction, words, mu, parts=()):
+    rows = eq7(direction, words, mu, parts)
     names = sorted({n for counts, *_ in rows for n in counts})
     if not names:
         return all(low <= known <= high for _, known, low, high in rows)
@@ -164,10 +166,10 @@ def partitions(direction, words, split, mu, most, patience=1):
     slack = 1e-9 * direction.canvas
     m = len(words)
     assert table.shape[1] == SYMBOLS + len(symbols)
-    for rows in (1_000, 16_000, patience * MOST_PARTITIONS):
+    for rows in (1_000, 16_000, int(patience * MOST_PARTITIONS)):
         found, columns, omega, pieces, all_ = walk(
             table, begin, ends, rest, m, len(symbols), least, most + slack,
-            direction.canvas + mu + slack, rows, patience * MOST_STEPS,
+            direction.canvas + mu + slack, rows, int(patience * MOST_STEPS),
         )  # fmt: skip
         if all_:
             break
@@ -178,41 +180,39 @@ def partitions(direction, words, split, mu, most, patience=1):
         yield round(value, 7), int(cuts), -int(count), [[cells[k] for k in col] for col in taken]
 
 
-def whole(columns):
-    """Return how many pieces every split letter has."""
+def whole(groups):
+    """Return how many pieces every split letter (group, row, letter) has."""
     counts = {}
-    for column in columns:
-        for row, cells in enumerate(column):
-            for c in cells:
-                if c.piece:
-                    counts[row, c.letter] = counts.get((row, c.letter), 0) + 1
+    for g, (_, columns) in enumerate(groups):
+        for column in columns:
+            for row, cells in enumerate(column):
+                for c in cells:
+                    if c.piece:
+                        counts[g, row, c.letter] = counts.get((g, row, c.letter), 0) + 1
     return counts
 
 
-def error(direction, words, columns, mu):
-    """(Ω, Σ) of a partition by a linear programme; None where no sizes are admitted."""
+def error(direction, groups, mu):
+    """(Ω, Σ) of the partitions of alignment groups by a linear programme, summed over them.
+
+    groups: (words, columns) of each. None where no sizes are admitted.
+    """
     canvas, slack = direction.canvas, 1e-9 * direction.canvas
-    pieces = whole(columns)
-    names = sorted({a.symbol for w in words for a in w if direction.rules[a.symbol].size is None})
+    pieces = whole(groups)
+    every = [word for words, _ in groups for word in words]
+    names = sorted({a.symbol for w in every for a in w if direction.rules[a.symbol].size is None})
     if not pieces and not names:
-        omega = sigma = 0.0
-        for column in columns:
-            values = [
-                sum(direction.rules[w[c.letter].symbol].size for c in cells)
-                for w, cells in zip(words, column)
-                if cells
-            ]
-            omega, sigma = omega + max(values) - min(values), sigma + max(values)
-        return (omega, sigma) if omega <= mu + slack and sigma <= canvas + mu + slack else None
+        return known_error(direction, groups, mu)
     place = {n: i for i, n in enumerate(names)}
-    for j, column in enumerate(columns):
+    flat = [(g, words, column) for g, (words, columns) in enumerate(groups) for column in columns]
+    for j, (g, _, column) in enumerate(flat):
         for row, cells in enumerate(column):
             for c in cells:
                 if c.piece:
-                    place[row, c.letter, j] = len(place)
-    n, k = len(place), len(columns)
+                    place[g, row, c.letter, j] = len(place)
+    n, k = len(place), len(flat)
     upper, equal = [], []
-    for j, column in enumerate(columns):
+    for j, (g, words, column) in enumerate(flat):
         for row, cells in enumerate(column):
             if not cells:
                 continue
@@ -220,7 +220,7 @@ def error(direction, words, columns, mu):
             for c in cells:
                 symbol = words[row][c.letter].symbol
                 if c.piece:
-                    line[place[row, c.letter, j]] += 1
+                    line[place[g, row, c.letter, j]] += 1
                 elif direction.rules[symbol].size is None:
                     line[place[symbol]] += 1
                 else:
@@ -229,20 +229,24 @@ def error(direction, words, columns, mu):
             up[n + j] -= 1
             down[n + k + j] += 1
             upper += [(up, -known), (down, known)]
-    for row, letter in pieces:
+    for g, row, letter in pieces:
         line = np.zeros(n + 2 * k)
         for j in range(k):
-            if (row, letter, j) in place:
-                line[place[row, letter, j]] = 1
-        symbol = words[row][letter].symbol
+            if (g, row, letter, j) in place:
+                line[place[g, row, letter, j]] = 1
+        symbol = groups[g][0][row][letter].symbol
         size = direction.rules[symbol].size
         if size is None:
             line[place[symbol]] -= 1
         equal.append((line, size or 0.0))
-    total = np.zeros(n + 2 * k)
-    total[n : n + k] = 1
-    upper.append((total, canvas + mu + slack))
-    for counts, known, low, high in eq7(direction, words, mu):
+    for g in range(len(groups)):
+        total, value = np.zeros(n + 2 * k), np.zeros(n + 2 * k)
+        for j in range(k):
+            if flat[j][0] == g:
+                total[n + j] = value[n + j] = 1
+                value[n + k + j] = -1
+        upper += [(total, canvas + mu + slack), (value, mu + slack)]
+    for counts, known, low, high in eq7(direction, every, mu, [len(words) for words, _ in groups]):
         line = np.zeros(n + 2 * k)
         for name, times in counts.items():
             line[place[name]] = times
@@ -252,44 +256,65 @@ def error(direction, words, columns, mu):
     cost = np.zeros(n + 2 * k)
     cost[n : n + k], cost[n + k :] = 1, -1
     status, x = least_cost(cost, upper, equal, least)
-    if status != 0 or cost @ x > mu + 2 * slack:
+    if status != 0:
         return None
     return max(0.0, float(cost @ x)), float(x[n : n + k].sum())
 
 
-def sizable(direction, words, columns):
-    """Tell whether positive sizes fill the canvas, by a linear programme."""
+def known_error(direction, groups, mu):
+    """(Ω, Σ) where all sizes are known."""
+    canvas, slack = direction.canvas, 1e-9 * direction.canvas
+    sums = []
+    for words, columns in groups:
+        omega = sigma = 0.0
+        for column in columns:
+            values = [
+                sum(direction.rules[w[c.letter].symbol].size for c in cells)
+                for w, cells in zip(words, column)
+                if cells
+            ]
+            omega, sigma = omega + max(values) - min(values), sigma + max(values)
+        if omega > mu + slack or sigma > canvas + mu + slack:
+            return None
+        sums.append((omega, sigma))
+    return tuple(map(sum, zip(*sums)))
+
+
+def sizable(direction, groups):
+    """Tell whether positive sizes fill the canvas in all groups, by a linear programme."""
     canvas = direction.canvas
-    symbols = sorted({a.symbol for w in words for a in w})
+    symbols = sorted({a.symbol for words, _ in groups for w in words for a in w})
     place = {s: i for i, s in enumerate(symbols)}
     pieces = {}
-    for j, column in enumerate(columns):
+    equal = []
+    flat = [(g, words, column) for g, (words, columns) in enumerate(groups) for column in columns]
+    for j, (g, _, column) in enumerate(flat):
         for row, cells in enumerate(column):
             for c in cells:
                 if c.piece:
-                    pieces.setdefault((row, c.letter), []).append(len(place))
-                    place[row, c.letter, j] = len(place)
-    equal = []
-    fill = np.zeros(len(place))
-    for j, column in enumerate(columns):
+                    pieces.setdefault((g, row, c.letter), []).append(len(place))
+                    place[g, row, c.letter, j] = len(place)
+    fill = np.zeros((len(groups), len(place)))
+    for j, (g, words, column) in enumerate(flat):
         first = None
         for row, cells in enumerate(column):
             if not cells:
                 continue
             line = np.zeros(len(place))
             for c in cells:
-                line[place[(row, c.letter, j) if c.piece else words[row][c.letter].symbol]] += 1
+                at = (g, row, c.letter, j) if c.piece else words[row][c.letter].symbol
+                line[place[at]] += 1
             if first is None:
                 first = line
-                fill += line
+                fill[g] += line
             else:
                 equal.append((line - first, 0.0))
-    for (row, letter), places in pieces.items():
+    for (g, row, letter), places in pieces.items():
         line = np.zeros(len(place))
         line[places] = 1
-        line[place[words[row][letter].symbol]] -= 1
+        line[place[groups[g][0][row][letter].symbol]] -= 1
         equal.append((line, 0.0))
-    equal.append((fill, 1.0))
+    equal += [(line, 1.0) for line in fill]
     sizes = [direction.rules[s].size for s in symbols]
     least = np.zeros(len(place))
     least[: len(symbols)] = [0.01 * s / canvas if s else 0.01 for s in sizes]
@@ -297,47 +322,78 @@ def sizable(direction, words, columns):
 
 
 def best(direction, words_of_layers, patience=1):
-    """(µ/canvas, Ω, pieces, columns, |Σ − canvas|) of the contract's answer, or None.
+    """Return `best_of` all tuples of the words of every layer, topmost first."""
+    return best_of(direction, list(itertools.product(*words_of_layers)), patience)
 
-    words_of_layers: all words of every layer, topmost first. patience: how many times more than
-    the tests have time for. Raises TooLarge.
+
+def best_of(direction, tuples, patience=1, parts=()):
+    """(µ/canvas, Ω, pieces, columns, |Σ − canvas|, layout) of the contract's answer, or None.
+
+    tuples: of words, one a layer, topmost first, alignment groups one after another; parts: layers
+    of each. Ω, pieces and columns are sums over the groups; layout: names of words and columns
+    that are the smallest, where all sizes are known. patience: how many times more than the tests
+    have time for. Raises TooLarge.
     """
+    parts = parts or (len(tuples[0]) if tuples else 0,)
     for share in TOLERANCES:
         mu = share * direction.canvas
-        candidates = [
-            words for words in itertools.product(*words_of_layers) if admitted(direction, words, mu)
-        ]
+        candidates = [words for words in tuples if admitted(direction, words, mu, parts)]
         for split in (False, True):
             for part in SHARES:
-                found = best_within(direction, candidates, split, mu, part * mu, patience)
+                found = best_within(
+                    direction, candidates, split, mu, part * mu * len(parts), patience, parts
+                )
                 if found is not None:
                     return (share, *found)
     return None
 
 
-def best_within(direction, candidates, split, mu, most, patience):
-    """(Ω, pieces, columns, |Σ − canvas|) of the best sizable partition with Ω ≤ most, or None.
+def best_within(direction, candidates, split, mu, most, patience, parts):
+    """(Ω, pieces, columns, |Σ − canvas|, layout) of the best sizable partition with Ω ≤ most.
 
-    Partitions come by what they are at best; those that cannot go before what is known are left.
+    None where there is none. Partitions come by what they are at best; those that cannot go before
+    what is known are left.
     """
     rows = []
     for words in candidates:
-        found = partitions(direction, words, split, mu, most, patience)
-        for floor, pieces, columns, cells in found:
-            rows.append(((floor, pieces, columns), words, cells))
+        ends = list(itertools.accumulate(parts))
+        split_words = [words[end - size : end] for end, size in zip(ends, parts)]
+        lists = [
+            list(partitions(direction, own, split, mu, min(most, mu), patience))
+            for own in split_words
+        ]
+        for several in itertools.product(*lists):
+            floor, pieces, columns = map(sum, list(zip(*several))[:3])
+            if floor <= most + 1e-6:
+                cells = [one[3] for one in several]
+                rows.append(((floor, pieces, columns), list(zip(split_words, cells))))
+            if len(rows) > 10 * patience * MOST_PROGRAMMES:
+                raise TooLarge
     winner = None
-    for number, (floor, words, cells) in enumerate(sorted(rows, key=lambda row: row[0])):
+    for number, (floor, groups) in enumerate(sorted(rows, key=lambda row: row[0])):
         if winner is not None and floor > winner[:3]:
             break
         if number > patience * MOST_PROGRAMMES:
             raise TooLarge
-        value = error(direction, words, cells, mu)
+        value = error(direction, groups, mu)
         if value is None or value[0] > most + 1e-9 * direction.canvas:
             continue
-        key = round(value[0], 7), *floor[1:], round(abs(value[1] - direction.canvas), 7)
-        if (winner is None or key < winner) and sizable(direction, words, cells):
+        off = round(abs(value[1] - direction.canvas * len(parts)), 7)
+        key = round(value[0], 7), *floor[1:], off, names(groups)
+        if (winner is None or key < winner) and sizable(direction, groups):
             winner = key
     if winner is None:
         return None
-    omega, pieces, columns, off = winner
-    return omega, pieces, -columns, off
+    omega, pieces, columns, *rest = winner
+    return omega, pieces, -columns, *rest
+
+
+def names(groups):
+    """Return the names of all words and of all columns."""
+    words = tuple(tuple(a.name for a in word) for words, _ in groups for word in words)
+    columns = tuple(
+        tuple(tuple(words[row][c.letter].name for c in column[row]) for column in cells)
+        for words, cells in groups
+        for row in range(len(words))
+    )
+    return words, columns

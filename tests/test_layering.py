@@ -10,11 +10,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from layering_checks import broken, reference_sizes
+from layering_checks import broken, compared, reference_sizes
 from layering_designs import random_direction, words_of
-from layering_oracle import TooLarge, best, least_cost
+from layering_language import Reading, drawn, random_document
+from layering_oracle import TooLarge, best, best_of, least_cost
 from scipy.optimize import linprog
 
+from facade_tools.artifacts.codec import from_json
+from facade_tools.artifacts.design import Design
 from facade_tools.errors import Infeasible, InvalidInput
 from facade_tools.layering.alignment import prepare
 from facade_tools.layering.evaluation import evaluate
@@ -23,6 +26,7 @@ from facade_tools.layering.lattice import lattices
 from facade_tools.layering.problem import Candidate, Direction, LayerPattern, Rule, Span
 from facade_tools.layering.search import Clock, GroupSearch
 from facade_tools.layering.solve import solve_direction
+from facade_tools.layering.stack import stack_of
 from facade_tools.layering.tasks import full_key
 from facade_tools.layering.words import Expansion, Letter, expand, reflected
 
@@ -68,6 +72,19 @@ def test_lattices_do_without_a_content_that_does_not_fit(control):
     }
 
 
+def spelt_by(lattice):
+    """Yield the words of a lattice's paths."""
+    leaving = {}
+    for edge in lattice.edges:
+        leaving.setdefault(edge.start, []).append(edge)
+    stack = [(0, ())]
+    while stack:
+        node, word = stack.pop()
+        if node in lattice.finals:
+            yield word
+        stack += [(edge.end, (*word, edge.letter)) for edge in leaving.get(node, [])]
+
+
 class TestLanguage:
     @pytest.mark.parametrize(
         ("pattern", "counters", "words"),
@@ -85,6 +102,34 @@ class TestLanguage:
     )
     def test_words(self, pattern, counters, words):
         assert texts(pattern, **counters) == words
+
+    @pytest.mark.parametrize("first", range(0, 200, 50))
+    def test_words_equal_an_independent_reading(self, first):
+        """Of random patterns: expanded one by one, and as paths of lattices."""
+        for seed in range(first, first + 50):
+            rng = random.Random(seed)
+            raw = {**random_document(rng), "canvas": {"width": 8.0, "height": 8.0}}
+            problem = stack_of(from_json(Design, raw)).direction("x")
+            clear = frozenset(name for name, rule in problem.rules.items() if rule.transparent)
+            bound = frozenset(name for name, rule in problem.rules.items() if rule.attached)
+            reading = Reading(raw, "x", 8.0)
+            rows = [row for rows in problem.groups.values() for row in rows]
+            values = list(reading.counters(reading.rows))
+            for counters in rng.sample(values, min(4, len(values))):
+                for row, text in zip(rows, reading.rows, strict=True):
+                    try:
+                        expected = set(reading.words(text, counters))
+                    except TooLarge:
+                        continue
+                    sizes, limit = problem.least_sizes(), 1.4 * 8.0 * (1.0 + 1e-9)
+                    how = Expansion(counters, sizes, limit, row.reflection, clear)
+                    found = expand(row.node, how)
+                    assert found.complete
+                    assert set(found.words) == expected, (seed, text, counters)
+                    family = lattices(row.node, how, bound)
+                    if family is not None and family.complete:
+                        spelt = {word for one in family.classes for word in spelt_by(one)}
+                        assert spelt == expected, (seed, text, counters)
 
     def test_control_letters_are_transparent_and_substitutes_are_one_word(self):
         node = Substituted(parse("xexz^-1"), (("x", parse("A|BC")), ("z", parse("AB"))))
@@ -231,6 +276,76 @@ class TestAlignment:
             assert (one.pieces, one.count) == expected[2:4]
             if not one.candidate.unsized:
                 assert abs(one.sigma - problem.canvas) == pytest.approx(expected[4], abs=2e-6)
+
+    @pytest.mark.parametrize("seed", range(60))
+    def test_of_the_whole_language_equals_the_brute_force(self, seed):
+        """Also |Σ − canvas| and all names where sizes are known; see layering_language."""
+        design = drawn(seed)
+        for groups, tuples, layers in design.searches():
+            try:
+                expected = best_of(design.problem, tuples, 0.2, layers)
+            except TooLarge:
+                pytest.skip("the brute force would take too long")
+            prepare()
+            clock = Clock(time.process_time() + 30.0, now=time.process_time)
+            search = GroupSearch(design.problem, groups, clock, few=0 if seed % 2 else 6)
+            found = search.answer()
+            assert compared(design.problem, expected, found, search.exhausted) == "equal"
+
+    @pytest.mark.parametrize("size", [1.8, None])
+    def test_a_piece_may_stand_alone_above_what_other_layers_are_empty_for(self, size):
+        """The bounds of two layers know columns that only a third one covers."""
+        rules = {"A": Rule(0.9), "B": Rule(0.9, attached=True), "C": Rule(3.1), "D": Rule(0.9)}
+        rules["f"] = Rule(size, transparent=True)
+        problem = direction([parse("CfA"), parse("AB"), parse("D")], 5.8, rules)
+        found = answer(problem)
+        assert found.alignment.tolerance == 0.02
+        assert columns(found.alignment)[0] == ["C", "f", "f", "A"]
+
+    def test_the_slack_of_eq_7_breaks_no_tie(self):
+        """An unsized size smaller by the slack is no better: fewer pieces go first."""
+        rules = {"A": Rule(2), "B": Rule(2), "C": Rule(2), "D": Rule(1, unoccludable=True)}
+        rules |= {name: Rule(None, transparent=True) for name in "ef"}
+        problem = direction([parse("e"), parse("ffAA"), parse("BACCDD")], 10.0, rules)
+        expected = best(problem, [words_of(problem, row) for row in problem.groups["default"]])
+        found = answer(problem)
+        assert compared(problem, expected, found, False) == "equal"
+        assert found.alignment.pieces == 2
+
+    def test_of_ties_the_sum_of_the_columns_that_is_nearer_the_canvas_goes_first(self):
+        """Also where it is the greater one, and a part of the layout shows too little of it."""
+        rules = {"A": Rule(2.5), "B": Rule(3.0), "C": Rule(2.0), "D": Rule(1.0)}
+        rules["e"] = Rule(3.0, transparent=True)
+        found = answer(direction([parse("eCADe"), parse("ADB")], 11.8, rules))
+        assert columns(found.alignment)[1] == ["AD", "", "", "", "B"]
+        assert found.alignment.sigma == pytest.approx(12.0)
+
+    def test_each_of_groups_that_are_solved_together_may_err_by_the_tolerance(self):
+        rules = {name: Rule(size) for name, size in zip("ABCD", [4.0, 3.2, 4.0, 3.2], strict=True)}
+        texts = ["A^k", "B^k", "C^k", "D^k"]
+        rows = [LayerPattern(t, t, parse(t)) for t in texts]
+        groups = {"one": tuple(rows[:2]), "two": tuple(rows[2:])}
+        problem = Direction("x", 8.0, rules, groups, {"k": (2, 2)})
+        apart = GroupSearch(problem, ("one",), Clock()).answer()
+        together = GroupSearch(replace(problem, counters={"k": (0, 4)}), ("one", "two"), Clock())
+        found = together.answer()
+        assert found.optimal
+        assert found.alignment.tolerance == apart.alignment.tolerance == 0.2
+        assert found.alignment.omega == pytest.approx(2 * apart.alignment.omega)
+
+    def test_groups_without_a_common_sizing_are_told_from_their_columns(self):
+        """What the groups' sums exclude takes all columns; others may have some of them."""
+        sizes = {"A": 3.0, "B": 1.5, "C": 2.5, "D": 3.0}
+        rules = {n: Rule(z, attached=n == "A", unoccludable=n == "D") for n, z in sizes.items()}
+        rules |= {name: Rule(None, transparent=True) for name in "ef"}
+        rows = [LayerPattern(t, t, parse(t)) for t in ["CeC", "CABC", "AefA", "ADBC"]]
+        groups = {"one": tuple(rows[:2]), "two": tuple(rows[2:])}
+        problem = Direction("x", 10.0, rules, groups)
+        words = tuple(words_of(problem, row)[0] for row in rows)
+        found = GroupSearch(problem, ("one", "two"), Clock()).answer()
+        expected = best_of(problem, [words], parts=(2, 2))
+        assert compared(problem, expected, found, False) == "equal"
+        assert found.alignment.tolerance == 0.1
 
     @pytest.mark.parametrize("seed", range(12))
     def test_lattices_equal_word_by_word(self, seed):

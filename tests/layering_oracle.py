@@ -366,7 +366,8 @@ def best_within(direction, candidates, split, mu, most, patience, parts):
             floor, pieces, columns = map(sum, list(zip(*several))[:3])
             if floor <= most + 1e-6:
                 cells = [one[3] for one in several]
-                rows.append(((floor, pieces, columns), list(zip(split_words, cells))))
+                key = round(floor, 7), pieces, columns
+                rows.append((key, list(zip(split_words, cells))))
             if len(rows) > 10 * patience * MOST_PROGRAMMES:
                 raise TooLarge
     winner = None

@@ -455,9 +455,21 @@ class TestSizing:
         assert found is None or columns(found.alignment) != [["A"], ["AB"]]
 
 
+def test_settings_of_a_content_are_refused():
+    """They were read over: a design has one reflection and one look a pattern."""
+    raw = {
+        "canvas": {"width": 6, "height": 3},
+        "symbols": {"A": {"size": 1.0}},
+        "patterns": {"P": {"control": "cec", "c": {"pattern": "A^-1", "reflection": "mirror"}}},
+        "layers": [{"x": "P", "y": "P"}],
+    }
+    with pytest.raises(InvalidInput, match="means nothing in a content") as error:
+        stack_of(from_json(Design, raw))
+    assert error.value.place.pointer == "/patterns/P/c/reflection"
+
+
 def test_an_unknown_counter_is_refused():
-    from facade_tools.artifacts.design import Canvas, Design, DesignLayer, DesignSymbol
-    from facade_tools.layering.stack import stack_of
+    from facade_tools.artifacts.design import Canvas, DesignLayer, DesignSymbol
 
     design = Design(Canvas(6, 3), {"A": DesignSymbol(1.0)}, {"P": "A^k"}, (DesignLayer("P", "P"),))
     with pytest.raises(InvalidInput, match="counter 'k'"):

@@ -170,6 +170,10 @@ def _node(raw: Any, pointer: str, depth: int) -> Node:
         raise InvalidInput(f"nested deeper than {MAX_DEPTH}", pointer=pointer)
     if isinstance(raw, str):
         return _parsed(raw, pointer)
+    lost = next((key for key in SETTINGS[2:] if depth and key in raw), None)
+    if lost is not None:
+        problem = f"{lost!r} means nothing in a content; expected beside the outermost `control`"
+        raise InvalidInput(problem, pointer=f"{pointer}/{lost}")
     if ("pattern" in raw) == ("control" in raw):
         raise InvalidInput("expected either `pattern` or `control`", pointer=pointer)
     if "pattern" in raw:

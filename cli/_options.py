@@ -124,6 +124,20 @@ on_error = click.option(
     show_default=True,
     help="What a bad item of a stream does; skip reports it and goes on.",
 )
+mesh_up = click.option(
+    "--up",
+    type=click.Choice(["auto", "y", "z"]),
+    default="auto",
+    show_default=True,
+    help="Which axis of an OBJ, PLY, STL or OFF is up; auto asks the textures.",
+)
+mesh_unit = click.option(
+    "--unit",
+    type=click.Choice(["m", "cm", "mm", "ft", "in"]),
+    default="m",
+    show_default=True,
+    help="Unit of an OBJ, PLY, STL or OFF; glTF and COLLADA say theirs.",
+)
 
 
 def stream_options(

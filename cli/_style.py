@@ -21,8 +21,9 @@ from facade_tools.artifacts.store import RawItem, digest, read_raw
 from facade_tools.artifacts.writing import atomic_folder
 from facade_tools.errors import InvalidInput
 from facade_tools.formats.exporting import FAR, model_files, near_origin
-from facade_tools.formats.mesh_reader import ENDINGS, read_textured
+from facade_tools.formats.mesh_reader import ENDINGS, STATED, read_textured
 from facade_tools.formats.style_folder import read_style, write_style
+from facade_tools.formats.textured import TexturedMesh
 from facade_tools.geometry.arrays import Floats
 from facade_tools.geometry.mesh import Scene
 from facade_tools.randomness import item_generator
@@ -51,10 +52,26 @@ log = logging.getLogger("facade_tools.capture_style")
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "in": 0.0254}
 
 
+@dataclass(frozen=True)
+class MeshOptions:
+    """How a mesh was drawn whose format does not say it: its upward axis and its unit."""
+
+    up: str
+    unit: str
+
+    def read(self, path: Path) -> TexturedMesh:
+        """Return a mesh in metres. Raises InvalidInput for what the format says otherwise."""
+        if (self.up, self.unit) != ("auto", "m") and path.suffix.lower() in STATED:
+            raise InvalidInput("states its unit and its axis; expected no --unit and no --up").at(
+                str(path)
+            )
+        mesh = read_textured(path)
+        return replace(mesh, vertices=METRES[self.unit] * mesh.vertices)
+
+
 def run_capture(model: str, output: str, options: CaptureOptions, unit: str) -> None:
     """Read a model, capture its style and write the sheet's folder."""
-    mesh = read_textured(Path(model))
-    mesh = replace(mesh, vertices=METRES[unit] * mesh.vertices)
+    mesh = MeshOptions(options.up, unit).read(Path(model))
     try:
         capture = capture_style(mesh, file_name(Path(model).parent.name or "model"), options)
     except InvalidInput as error:
@@ -90,6 +107,7 @@ class Dresser:
     sizes: Mapping[str, tuple[float, float, float]]
     small: float
     seed: int
+    meshes: MeshOptions
 
     def __call__(self, source: Source) -> tuple[str, Scene, Floats]:
         """Return the base's id, its scene and how far that is from its place (3,), m.
@@ -97,7 +115,7 @@ class Dresser:
         Raises InvalidInput with the place of what is wrong.
         """
         try:
-            return self.dressed(*_base(source))
+            return self.dressed(*_base(source, self.meshes))
         except InvalidInput as error:
             raise error.at(*_place(source)) from None
 
@@ -142,7 +160,11 @@ def _brought_near(
 
 
 def run_retarget(
-    styles: Sequence[str], stream: StreamOptions, resize: Sequence[str], small: float
+    styles: Sequence[str],
+    stream: StreamOptions,
+    resize: Sequence[str],
+    small: float,
+    meshes: MeshOptions,
 ) -> None:
     """Put styles onto all bases and write their models."""
     output = str(stream.output)
@@ -153,7 +175,7 @@ def run_retarget(
     if not is_folder(output):
         sources = _single(sources, output)
     sheets = [_style(Path(folder)) for folder in styles]
-    dresser = Dresser(sheets, sizes, small, stream.seed or 0)
+    dresser = Dresser(sheets, sizes, small, stream.seed or 0, meshes)
     faults = Faults("retarget", stream.on_error)
     seen: dict[str, str] = {}
     origin: Floats = np.zeros(3)
@@ -237,10 +259,10 @@ def _place(source: Source) -> tuple[str, int | None]:
     return source.source, source.line
 
 
-def _base(source: Source) -> tuple[Blocks, bool, Building | None]:
+def _base(source: Source, meshes: MeshOptions) -> tuple[Blocks, bool, Building | None]:
     """Return a base, whether it may be given a bottom and a top, and the building it is of."""
     if isinstance(source, MeshFile):
-        return mesh_blocks(read_textured(source.path), source.id), True, None
+        return mesh_blocks(meshes.read(source.path), source.id, meshes.up), True, None
     artifact = source.artifact("blocks", "building", "layout")
     if isinstance(artifact, Blocks):
         return artifact, False, None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from ._options import FiniteRange, finite, output
+from ._options import FiniteRange, finite, mesh_unit, mesh_up, output
 
 
 def _count(_: click.Context, parameter: click.Parameter, value: str) -> int | None:
@@ -50,20 +50,8 @@ def _azimuth(_: click.Context, parameter: click.Parameter, value: str) -> float 
     help="Depth of walls from their outer to their inner boundary, metres: how much of them an "
     "overhang may thin. Default: the depth of their relief.",
 )
-@click.option(
-    "--up",
-    type=click.Choice(["auto", "y", "z"]),
-    default="auto",
-    show_default=True,
-    help="Which axis of an OBJ or PLY is up; auto asks the textures.",
-)
-@click.option(
-    "--unit",
-    type=click.Choice(["m", "cm", "mm", "ft", "in"]),
-    default="m",
-    show_default=True,
-    help="Unit of an OBJ or PLY; glTF and COLLADA say theirs.",
-)
+@mesh_up
+@mesh_unit
 def command(
     model: str,
     output: str | None,

@@ -6,7 +6,17 @@ from typing import Any
 
 import click
 
-from ._options import FiniteRange, StreamOptions, jobs, on_error, output, scheduler, seed
+from ._options import (
+    FiniteRange,
+    StreamOptions,
+    jobs,
+    mesh_unit,
+    mesh_up,
+    on_error,
+    output,
+    scheduler,
+    seed,
+)
 
 
 @click.command()
@@ -34,6 +44,8 @@ from ._options import FiniteRange, StreamOptions, jobs, on_error, output, schedu
     help="Share of a side's area below which a group of faces, on blocks that stand together "
     "otherwise than in the source, takes the texture of a larger group; 0 never.",
 )
+@mesh_up
+@mesh_unit
 @seed
 @jobs
 @scheduler
@@ -45,19 +57,21 @@ def command(
     styles: tuple[str, ...],
     resize: tuple[str, ...],
     reassign: float,
+    up: str,
+    unit: str,
     **values: Any,
 ) -> None:
     """Put the look of a style sheet onto buildings of another structure (LNSW13).
 
     BASE is blocks.json (of a style sheet, or hand-written), buildings or layouts (.json, .jsonl,
-    -), or a mesh. PATH is a .glb or .obj file, or a folder that gets a GLB a base. Buildings,
+    -), or a mesh (--up and --unit tell how it was drawn). PATH is a .glb or .obj file, or a folder that gets a GLB a base. Buildings,
     layouts and meshes get a bottom and a top as high as the style's where there is room.
 
     \b
     Example:
       facade retarget tower-style houses.jsonl -o styled/
     """
-    from ._style import is_style, run_retarget
+    from ._style import MeshOptions, is_style, run_retarget
 
     if output is None:
         raise click.UsageError("Missing option '-o': name a .glb, an .obj or a folder.")
@@ -66,4 +80,4 @@ def command(
     if not rest:
         raise click.UsageError("Missing argument 'BASE...'.")
     stream = StreamOptions(inputs=tuple(rest), output=output, **values)
-    run_retarget((style, *styles, *more), stream, resize, reassign)
+    run_retarget((style, *styles, *more), stream, resize, reassign, MeshOptions(up, unit))

@@ -46,6 +46,37 @@ def test_several_bases_into_one_file_are_refused_before_any_work(facade_here, sh
     assert not (tmp_path / "x").exists()
 
 
+def lying_in_inches(path):
+    """Write the sample house as a drawing in inches that is y up."""
+    lines = (SAMPLES / "l-block" / "model.obj").read_text().splitlines()
+    for k, line in enumerate(lines):
+        if line.startswith("v "):
+            x, y, z = (float(v) / 0.0254 for v in line.split()[1:4])
+            lines[k] = f"v {x} {z} {-y}"
+    path.write_text("\n".join(lines))
+    return path
+
+
+def test_a_mesh_as_base_has_its_unit_and_its_axis(facade_here, sheet, tmp_path):
+    base = lying_in_inches(tmp_path / "house.obj")
+    out = tmp_path / "house.glb"
+    done = facade_here("retarget", sheet, base, "--unit", "in", "--up", "y", "-o", out)
+    assert done.returncode == 0, done.stderr
+    found = read_textured(out).vertices
+    own = read_textured(SAMPLES / "l-block" / "model.obj").vertices
+    assert np.allclose(np.ptp(found, axis=0), np.ptp(own, axis=0), atol=0.05)
+
+
+def test_a_base_that_states_its_unit_takes_none(facade_here, sheet, tmp_path):
+    trimesh.creation.box((20, 10, 9)).export(tmp_path / "box.glb")
+    for options in (("--unit", "in"), ("--up", "y")):
+        done = facade_here(
+            "retarget", sheet, tmp_path / "box.glb", *options, "-o", tmp_path / "new.glb"
+        )
+        assert done.returncode == 3
+        assert "box.glb: states its unit and its axis" in done.stderr.decode()
+
+
 def test_ids_that_are_one_file_name_are_refused(facade_here, sheet, tmp_path):
     bases = [base_file(tmp_path / f"{k}.json", name) for k, name in enumerate(["a/b", "a_b"])]
     done = facade_here("retarget", sheet, *bases, "-o", tmp_path / "out")

@@ -16,6 +16,7 @@ from .textured_ply import read_ply
 READERS = {".obj": read_obj, ".glb": read_gltf, ".gltf": read_gltf, ".ply": read_ply}
 READERS |= {".dae": read_dae, ".stl": read_bare, ".off": read_bare}
 ENDINGS = tuple(READERS)
+STATED = (".glb", ".gltf", ".dae")  # formats that say their unit and which way is up
 
 
 def read_textured(path: Path) -> TexturedMesh:

@@ -181,6 +181,9 @@ def _is_frame(matrix: Floats) -> bool:
     return bool(affine and volume > THINNEST * math.prod(lengths.tolist()) > 0)
 
 
-def mesh_blocks(mesh: TexturedMesh, identity: str) -> Blocks:
-    """Return the blocks of a mesh by structure detection, in its own frame."""
-    return modelled(mesh, identity, CaptureOptions()).blocks
+def mesh_blocks(mesh: TexturedMesh, identity: str, up: str = "auto") -> Blocks:
+    """Return the blocks of a mesh (m) by structure detection, in its own frame.
+
+    up: its upward axis, "y" or "z"; "auto" asks the textures.
+    """
+    return modelled(mesh, identity, CaptureOptions(up=up)).blocks

@@ -28,7 +28,7 @@ from facade_tools.randomness import item_generator
 
 from ._items import load
 from ._options import StreamOptions, refuse_overwriting
-from ._rectifying import check_rectification, rectification_of
+from ._rectifying import check_rectification, rectification_of, tell_angle
 from ._report import Progress
 from ._stream import (
     Faults,
@@ -105,6 +105,8 @@ class Read:
             if self.options.rectify is not None:
                 turned = rectification_of(photo, self.options.rectify)
                 photo, mask = _straight(photo, mask, turned)
+            else:
+                tell_angle(path, photo)
             method = _method(self.options.method, _read_options(self.options))
             reading = method(photo, identity, rng=rng, mask=mask)
         except InvalidInput as error:

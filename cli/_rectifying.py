@@ -15,7 +15,13 @@ from facade_tools.artifacts.writing import write_bytes
 from facade_tools.errors import InvalidInput
 from facade_tools.imaging.homography import Points
 from facade_tools.imaging.image_io import Photo, encoded, read_photo
-from facade_tools.imaging.rectify import Rectification, automatic, from_corners, from_report
+from facade_tools.imaging.rectify import (
+    Rectification,
+    angle_of_view,
+    automatic,
+    from_corners,
+    from_report,
+)
 
 from ._options import refuse_overwriting
 from ._stream import to_stdout
@@ -57,6 +63,13 @@ def run_rectify(image: str, output: str | None, corners: str, report: str | None
 def _tell_guess(image: str, found: Rectification) -> None:
     if found.guessed:
         LOG.warning("%s: its lines do not tell the focal length; width to height is a guess", image)
+
+
+def tell_angle(image: str, photo: Photo) -> None:
+    """Warn where a photograph that is taken to be straight looks otherwise."""
+    angle = angle_of_view(photo.pixels)
+    if angle is not None:
+        LOG.warning("%s: looks taken at an angle of %.0f degrees: --rectify auto", image, angle)
 
 
 def _found(photo: Photo, corners: Points | None) -> Rectification:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -12,9 +13,10 @@ from facade_tools.errors import InvalidInput
 from facade_tools.grammar.library import builtin
 from facade_tools.imaging.homography import applied, fitted_homography, warped
 from facade_tools.imaging.image_io import decoded
-from facade_tools.imaging.rectify import automatic, from_corners, from_report
+from facade_tools.imaging.rectify import angle_of_view, automatic, from_corners, from_report
 from facade_tools.segmentation.painting import render_facade
 
+PHOTOS = Path(__file__).parent.parent / "sample_data" / "photos"
 WIDTH, HEIGHT = 330, 440
 CORNERS = np.array([[0, 0], [WIDTH, 0], [WIDTH, HEIGHT], [0, HEIGHT]], np.float64)
 
@@ -162,3 +164,37 @@ def test_the_command(facade, front, tmp_path):
         assert b"is an input and would be overwritten" in over.stderr
         assert photo.read_bytes() == before
     assert facade("rectify", tmp_path / "none.png", "-o", out).returncode == 3
+
+
+@pytest.mark.parametrize("turn", [(0, 0.27, 0), (0, -0.45, 0), (0.3, 0, 0), (0.17, 0.26, 0)])
+def test_photographs_taken_at_an_angle_are_told(front, turn):
+    _, homography = photographed(turn)
+    angle = angle_of_view(warped(front, homography, (640, 700)))
+    assert angle == pytest.approx(np.degrees(np.linalg.norm(turn)), abs=6)
+
+
+@pytest.mark.parametrize("turn", [(0, 0, 0), (0, 0.05, 0), (0, 0, 0.05)])
+def test_photographs_taken_from_the_front_are_not(front, turn):
+    assert angle_of_view(front) is None
+    _, homography = photographed(turn)
+    assert angle_of_view(warped(front, homography, (640, 700))) is None
+
+
+@pytest.mark.parametrize("shape", [(4, 4, 3), (200, 300, 3)])
+def test_a_picture_without_lines_looks_straight(shape):
+    assert angle_of_view(np.full(shape, 90, np.uint8)) is None
+    noise = np.random.default_rng(1).integers(0, 255, shape, np.uint8)
+    assert angle_of_view(noise) is None
+
+
+def test_parse_image_says_what_was_taken_at_an_angle(facade, tmp_path):
+    photo = PHOTOS / "at-an-angle.jpg"
+    done = facade("parse-image", photo, PHOTOS / "facade-1.jpg", "-o", tmp_path / "a.jsonl")
+    told = [line for line in done.stderr.decode().splitlines() if "angle of" in line]
+    assert done.returncode == 0
+    assert len(told) == 1
+    assert told[0].endswith(
+        "at-an-angle.jpg: looks taken at an angle of 34 degrees: --rectify auto"
+    )
+    straight = facade("parse-image", photo, "--rectify", "auto", "-o", tmp_path / "b.json")
+    assert b"looks taken" not in straight.stderr

@@ -17,13 +17,16 @@ from numpy.typing import NDArray
 from ..errors import InvalidInput
 from .homography import Homography, Points, applied, fitted_homography, warped
 from .image_io import MAX_PIXELS, MAX_SIDE, Picture
-from .rectify_lines import segments_of, vanishing_points
+from .rectify_lines import segments_of, straight_share, vanishing_points
 
 Vector = NDArray[np.float64]  # (3,) homogeneous
 
 USUAL_FOCAL = 1.1  # of the longer side
 FOCALS = (0.35, 6.0)  # of the longer side: what a camera may have
 LEAST_CONFIDENCE = 0.35
+SURE = 0.5  # confidence from where an angle of view is told
+PARALLEL = 0.87  # of the lines that meet: with more, the picture is straight, its points are noise
+LEAST_ANGLE = 8.0  # degrees
 LEAST_LEAN = np.radians(5.0)  # from where proportions hang on the focal length
 LEAST_TELLING = np.radians(2.0)  # out of the picture's plane: both directions, to tell that length
 MOST_GROWTH = 3.0  # of a side
@@ -106,6 +109,26 @@ def automatic(picture: Picture) -> Rectification:
         raise InvalidInput(message + "name the corners")
     metric, guessed = _metric(picture.shape, across, down)
     return replace(_framed(picture.shape, metric, confidence), guessed=guessed)
+
+
+def angle_of_view(picture: Picture) -> float | None:
+    """Return the angle (degrees) between a facade's normal and the view, None if it looks straight.
+
+    It looks straight where its lines tell less than LEAST_ANGLE, tell it unsurely, or are about as
+    parallel as they meet. A focal length that they do not tell is taken to be a usual one.
+    """
+    if min(picture.shape[:2]) < LEAST_SIDE:
+        return None
+    lines = segments_of(picture)
+    across, down, confidence = vanishing_points(lines, picture.shape)
+    if confidence < SURE or straight_share(lines, picture.shape, (across, down)) > PARALLEL:
+        return None
+    height, width = picture.shape[:2]
+    focal = USUAL_FOCAL * max(height, width)
+    camera = np.array([[1, 0, -width / 2], [0, 1, -height / 2], [0, 0, focal]])
+    normal = np.cross(_unit(camera @ across), _unit(camera @ down))
+    angle = float(np.degrees(np.arccos(min(1.0, abs(_unit(normal)[2])))))
+    return angle if angle >= LEAST_ANGLE else None
 
 
 def _line(one: Vector, other: Vector) -> Vector:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +62,29 @@ def vanishing_points(lines: Segments, shape: tuple[int, ...]) -> tuple[Vector, V
     total = float(_lengths(lines).sum())
     confidence = 0.0 if total == 0 else agreed / total * min(few, 1.0)
     return points[0], points[1], confidence
+
+
+def straight_share(lines: Segments, shape: tuple[int, ...], points: Sequence[Vector]) -> float:
+    """Return how much of what meets in two vanishing points is parallel, too.
+
+    The lesser share of the two families: of line length that meets in the point, what agrees with
+    the point's direction in the middle of the picture, or with the picture's own axis. 1 and more
+    where the plane is seen from the front.
+    """
+    angle = np.arctan2(np.abs(lines[:, 3] - lines[:, 1]), np.abs(lines[:, 2] - lines[:, 0]))
+    centre = np.array([shape[1] / 2, shape[0] / 2])
+    plain = lines.reshape(-1, 2, 2) - centre
+    shares = []
+    for axis, family in enumerate((angle < STEEP, angle > np.pi / 2 - STEEP)):
+        middles, ways = plain[family].mean(axis=1), plain[family, 1] - plain[family, 0]
+        lengths = np.linalg.norm(ways, axis=1)
+        ways /= lengths[:, None]
+        x, y, w = points[axis]
+        far = [np.array([x - w * centre[0], y - w * centre[1], 0.0]), np.eye(3)[axis]]
+        near = np.array([*far[0][:2], w])
+        met, *parallel = (float(lengths[_meets(p, middles, ways)].sum()) for p in (near, *far))
+        shares.append(max(parallel) / met if met > 0 else 1.0)
+    return min(shares)
 
 
 def _meeting(plain: NDArray[np.float64]) -> tuple[Vector, NDArray[np.bool_]]:

@@ -196,7 +196,7 @@ class Counts:
 def counts(style: Style) -> Counts:
     """Return how windows of wide faces are counted and how their widths are kept."""
     worst, off = 0.0, []
-    rules = aligned_rules(style.sheet, style.blocks)
+    rules = aligned_rules(style.sheet, style.blocks, style.pictures)
     for group in sorted({f.vertical for w in style.sheet.walls for f in w.faces}):
         rule = rules[group]
         for factor in (1.5, 2.0) if rule.insertable else ():

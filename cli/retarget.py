@@ -64,8 +64,9 @@ def command(
     """Put the look of a style sheet onto buildings of another structure (LNSW13).
 
     BASE is blocks.json (of a style sheet, or hand-written), buildings or layouts (.json, .jsonl,
-    -), or a mesh (--up and --unit tell how it was drawn). PATH is a .glb or .obj file, or a folder that gets a GLB a base. Buildings,
-    layouts and meshes get a bottom and a top as high as the style's where there is room.
+    -), or a mesh (--up and --unit tell how it was drawn). PATH is a .glb or .obj file, or a folder
+    that gets a GLB a base. Buildings, layouts and meshes get a bottom and a top as high as the
+    style's where there is room.
 
     \b
     Example:

@@ -51,7 +51,7 @@ def test_groups_in_line_share_a_rule_and_others_do_not():
     style = capture_style(mesh, "corner-house", CaptureOptions())
     rules = {rule.id: SplitRule(rule.a, rule.b) for rule in style.sheet.rules}
     known = {group.id: rules[group.rule] for group in style.sheet.groups}
-    found = aligned_rules(style.sheet, style.blocks)
+    found = aligned_rules(style.sheet, style.blocks, style.pictures)
     assert set(found) == set(known)
     front = {f.vertical for w in style.sheet.walls if w.side == "front" for f in w.faces}
     assert len({found[group] for group in front}) < len({known[group] for group in front})

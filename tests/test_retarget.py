@@ -33,6 +33,7 @@ from facade_tools.stylization.placing import (
 )
 from facade_tools.stylization.resizing import resized
 from facade_tools.stylization.retarget import retarget
+from facade_tools.stylization.splitting import SplitRule, split
 from facade_tools.stylization.style import Style
 
 SAMPLES = Path(__file__).parent.parent / "sample_data" / "textured"
@@ -396,7 +397,7 @@ def niched():
 def niches(style, blocks):
     """Left and right ends (m) of the niches in the plan of the lowest slab."""
     chosen = matched_blocks(style.sheet, style.blocks, blocks)
-    style, chosen = with_bays(style, chosen, blocks)
+    style, chosen = with_bays(style, chosen, blocks, {})
     placed = placed_blocks(style.sheet, style.blocks, blocks, chosen)
     slab = placed_slabs(style.sheet, placed[0])[0]
     open_ = ~slab.cells[int(np.searchsorted(slab.ys, slab.ys[0] + 0.15)) - 1]
@@ -415,3 +416,21 @@ def test_niches_in_the_plan_are_repeated_and_keep_their_width(factor, count):
     assert closed(scene.meshes[0])
     front = next(m for m in scene.meshes if m.name == f"{block.id}/front")
     assert wall_area(front) == pytest.approx(18 * factor * 6, rel=0.01)
+
+
+def test_shops_of_a_bottom_block_stand_once_however_high_it_grows(styles):
+    style = styles["stepped-tower"]
+    ground = next(b for b in style.sheet.blocks if b.role == "bottom")
+    face = next(f for w in style.sheet.walls if w.block == ground.id for f in w.faces)
+    rows = next(g for g in style.sheet.groups if g.id == face.horizontal).rule
+    rule = next(SplitRule(r.a, r.b) for r in style.sheet.rules if r.id == rows)
+    assert rule.insertable
+    block = next(b for b in style.blocks.blocks if b.id == ground.id)
+    taller = resized(style.blocks, {block.id: (block.width, block.depth, 2.2 * block.height)})
+    placed = placed_blocks(style.sheet, style.blocks, taller)
+    slabs = [placed_slabs(style.sheet, item) for item in placed]
+    index = next(i for i, item in enumerate(placed) if item.source.id == ground.id)
+    for panel in panels(style.sheet, placed, slabs):
+        if panel.block == index:
+            done = split(panel.rules[1], panel.target[1])
+            assert done.sources.count(2 * len(rule.insertable) - 1) == 1

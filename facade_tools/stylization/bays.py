@@ -6,10 +6,11 @@ colours of its picture: where walls stand before or behind their usual plane is 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
+import cv2
 import numpy as np
 
 from ..artifacts.blocks import Blocks
@@ -18,9 +19,11 @@ from ..geometry.arrays import Booleans, Floats
 from ..imaging.image_io import Picture
 from .columns import FLUSH, common_rule
 from .groups import LEAST_WALL, MULLION
+from .likeness import SIDE, in_line
 from .projection import SIDES
 from .splitting import SplitRule, end_wall, insertable_labels, merged, rule_of, split
 from .style import Style
+from .synthesis import synthesised
 
 OFF = 0.02  # m: what stands off its plane by more is relief
 SHARE = 0.15  # of the height that has relief somewhere, for a block to have bays
@@ -29,6 +32,7 @@ NARROWEST, WIDEST = 0.2, 8.0  # m: of a bay; wider relief is a wing, and stretch
 CORNERS = 0.2  # of a wall in the plane of its corners, for that to be its plane
 CORNER = 0.01  # m: relief nearer to a corner is the corner's
 PATIENCE = 0.5, 1.5  # least and most that the walls beside bays take: their pictures stretch, too
+LOWEST = 0.5  # m: of a floor in which bays are told apart
 SAME = 0.01  # change of size that leaves all as it is
 PLAIN = Group("bay", "vertical", "bay")  # of parts of faces: they are stretched with their piece
 
@@ -139,21 +143,26 @@ def pieces(bays: Bays, size: float, target: float) -> list[Piece]:
     return [p for p in found if min(p.old[1] - p.old[0], p.new[1] - p.new[0]) > 1e-9]
 
 
-def with_bays(style: Style, chosen: Sequence[str], target: Blocks) -> tuple[Style, list[str]]:
+def with_bays(
+    style: Style, chosen: Sequence[str], target: Blocks, rules: Mapping[str, SplitRule]
+) -> tuple[Style, list[str]]:
     """Return a style with a block of its own for every target whose relief repeats.
 
-    chosen: ids of the source blocks of the target's blocks. Returns the style and the new ids.
+    chosen: ids of the source blocks of the target's blocks. rules: of the groups, by which signs
+    are told. Returns the style and the new ids.
     """
     ids = []
     for source, block in zip(chosen, target.blocks, strict=True):
         name = source
         for axis, size in enumerate((block.width, block.depth)):
-            style, name = _with_bays(style, name, axis, size)
+            style, name = _with_bays(style, name, axis, size, rules)
         ids.append(name)
     return style, ids
 
 
-def _with_bays(style: Style, name: str, axis: int, target: float) -> tuple[Style, str]:
+def _with_bays(
+    style: Style, name: str, axis: int, target: float, rules: Mapping[str, SplitRule]
+) -> tuple[Style, str]:
     sheet = style.sheet
     block = next(b for b in sheet.blocks if b.id == name)
     size = block.size[axis]
@@ -161,7 +170,10 @@ def _with_bays(style: Style, name: str, axis: int, target: float) -> tuple[Style
     bays = relief_bays([sheet.floors[i] for i in numbers], axis, size)
     if bays is None or abs(target / size - 1) < SAME:
         return style, name
-    found = pieces(_with_windows(bays, sheet, name, axis), size, target)
+    bays = _with_windows(bays, sheet, name, axis)
+    bays = replace(bays, rule=in_line(bays.rule, list(_rows(style, bays, name, axis))))
+    found = pieces(bays, size, target)
+    signs = {k: rule for k, rule in rules.items() if 0 < len(rule.insertable) == len(rule.once)}
     new = f"{name}/{'xy'[axis]}{len(sheet.blocks)}"
     pictures = dict(style.pictures)
     floors = [replace(_floor(sheet.floors[i], axis, found), block=new) for i in numbers]
@@ -171,13 +183,17 @@ def _with_bays(style: Style, name: str, axis: int, target: float) -> tuple[Style
     for wall in sheet.walls:
         if wall.block == name:
             along = SIDES[wall.side][0] == axis
-            faces = [
-                replace(part, floor=number[face.floor])
-                for face in wall.faces
-                for part in (
-                    _along(face, found, pictures) if along else _across(face, found, ends, target)
-                )
-            ]
+            faces = []
+            for face in wall.faces:
+                sign = signs.get(face.vertical) if along else None
+                board = _board(face, sign, bays, found, pictures) if sign is not None else None
+                if board is not None:
+                    parts: Iterable[StyleFace] = [board]
+                elif along:
+                    parts = _along(face, found, pictures)
+                else:
+                    parts = _across(face, found, ends, target)
+                faces += [replace(part, floor=number[face.floor]) for part in parts]
             walls.append(replace(wall, block=new, faces=tuple(faces)))
     sizes = tuple(target if k == axis else v for k, v in enumerate(block.size))
     sheet = replace(
@@ -212,6 +228,38 @@ def _with_windows(bays: Bays, sheet: StyleSheet, name: str, axis: int) -> Bays:
         if both is not None and len(both.insertable) == len(rule.insertable):
             rule = both
     return replace(bays, rule=rule)
+
+
+def _rows(style: Style, bays: Bays, name: str, axis: int) -> Iterator[Picture]:
+    """Yield what can be seen of every floor between the margins of a block, on both sides."""
+    for wall in style.sheet.walls:
+        if wall.block != name or SIDES[wall.side][0] != axis:
+            continue
+        floors: dict[int, list[StyleFace]] = {}
+        for face in wall.faces:
+            floors.setdefault(face.floor, []).append(face)
+        for faces in floors.values():
+            if faces[0].top - faces[0].bottom >= LOWEST:
+                faces.sort(key=lambda face: -SIDES[wall.side][3] * face.place, reverse=True)
+                yield _painted(style, bays, faces)
+
+
+def _painted(style: Style, bays: Bays, faces: Sequence[StyleFace]) -> Picture:
+    """Return the faces of a floor between the margins, from the farthest to the nearest."""
+    row = np.zeros((SIDE, max(1, round(SIDE * bays.rule.size)), 3), dtype=np.uint8)
+    for face in faces:
+        low, high = sorted((face.start, face.end))
+        a, b = (round(SIDE * (v - bays.low)) for v in (low, high))
+        if b <= a:
+            continue
+        whole = cv2.resize(
+            style.pictures[face.texture], (b - a, SIDE), interpolation=cv2.INTER_AREA
+        )
+        whole = whole if face.end > face.start else whole[:, ::-1]
+        first, last = max(a, 0), min(b, row.shape[1])
+        if first < last:
+            row[:, first:last] = whole[:, first - a : last - a]
+    return row
 
 
 def _floor(floor: StyleFloor, axis: int, found: Sequence[Piece]) -> StyleFloor:
@@ -261,6 +309,40 @@ def _along(
         name = f"{face.texture}:{first}:{last}"
         pictures[name] = picture[:, first:last]
         yield replace(face, start=start, end=end, texture=name, vertical=PLAIN.id)
+
+
+def _board(
+    face: StyleFace,
+    rule: SplitRule,
+    bays: Bays,
+    found: Sequence[Piece],
+    pictures: dict[str, Picture],
+) -> StyleFace | None:
+    """Return a sign that runs over all bays, its letters not cut; None if it does not reach so far.
+
+    rule: of the sign. Its new picture is added to the pictures.
+    """
+    low, high = sorted((face.start, face.end))
+    first, last = bays.rule.scalable[0], bays.rule.scalable[-1]
+    inner = bays.low + first, bays.low + bays.rule.size - last
+    if low > inner[0] + 1e-6 or high < inner[1] - 1e-6:
+        return None
+    ends = [
+        next((_moved(p, v) for p in order if p.old[0] - 1e-6 <= v <= p.old[1] + 1e-6), None)
+        for v, order in ((low, found), (high, found[::-1]))
+    ]
+    if ends[0] is None or ends[1] is None:
+        return None
+    start, end = (ends[0], ends[1]) if face.end > face.start else (ends[1], ends[0])
+    old, new, height = high - low, abs(end - start), face.top - face.bottom
+    picture = pictures[face.texture]
+    name = f"{face.texture}:{new:.6f}"
+    rules = (rule, SplitRule((height,)))
+    density = picture.shape[1] / old
+    drawn = synthesised(picture, rules, (old, height), (new, height), density)
+    back = cv2.resize(drawn, (drawn.shape[1], picture.shape[0]))
+    pictures[name] = np.asarray(back, dtype=np.uint8)
+    return replace(face, start=start, end=end, texture=name, vertical=PLAIN.id)
 
 
 def _across(

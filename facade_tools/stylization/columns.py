@@ -8,15 +8,19 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ..artifacts.blocks import Blocks
 from ..artifacts.stylesheet import StyleSheet
+from ..imaging.image_io import Picture
+from .likeness import in_line, standing_once
 from .projection import SIDES
 from .splitting import SplitRule
 
 FLUSH = 0.01  # of the width: how far the ends of faces above one another may part
 COARSER = 2  # windows that may become one section
+LOWEST = 0.5  # m: of a group with windows; lower ones are plinths and mouldings
 LEAST_WALL = 0.1  # of a face, that has to stay scalable
 
 
@@ -31,19 +35,43 @@ class _Stack:
     area: float
 
 
-def aligned_rules(sheet: StyleSheet, own: Blocks) -> dict[str, SplitRule]:
+def aligned_rules(
+    sheet: StyleSheet, own: Blocks, pictures: Mapping[str, Picture]
+) -> dict[str, SplitRule]:
     """Return the rule of every group, for groups whose windows stand in line a common one.
 
     own: the style's own blocks. Groups of a side are joined, the largest first, where their faces
     have the same ends and what is insertable in one or the other leaves walls between sections.
+    What stands once in the pictures of a group is not inserted a second time; a group that is all
+    that (a sign) joins no other.
     """
     known = {rule.id: SplitRule(rule.a, rule.b) for rule in sheet.rules}
     rules = {group.id: known[group.rule] for group in sheet.groups}
+    rows = _rows(sheet, pictures)
+    rules |= {group: standing_once(rules[group], shown) for group, shown in rows.items()}
     joined: list[list[_Stack]] = []
     for stack in sorted(_stacks(sheet, own), key=lambda s: (-s.area, s.group)):
-        if rules[stack.group].insertable:
+        rule, high = rules[stack.group], stack.area >= LOWEST * (stack.end - stack.start)
+        if high and len(rule.insertable) > len(rule.once):
             _join(stack, joined, rules)
+    for members in joined:
+        if len(members) > 1:
+            common = in_line(rules[members[0].group], [rows[m.group] for m in members])
+            rules.update({member.group: common for member in members})
     return rules
+
+
+def _rows(sheet: StyleSheet, pictures: Mapping[str, Picture]) -> dict[str, Picture]:
+    """Return the picture of the largest face of every vertical group with windows."""
+    insertable = {rule.id for rule in sheet.rules if rule.b}
+    groups = {group.id for group in sheet.groups if group.rule in insertable}
+    largest: dict[str, tuple[float, str]] = {}
+    for wall in sheet.walls:
+        for face in wall.faces:
+            area = abs(face.end - face.start) * (face.top - face.bottom)
+            if face.vertical in groups and area > largest.get(face.vertical, (0.0, ""))[0]:
+                largest[face.vertical] = area, face.texture
+    return {group: pictures[texture] for group, (_, texture) in largest.items()}
 
 
 def _join(stack: _Stack, joined: list[list[_Stack]], rules: dict[str, SplitRule]) -> None:

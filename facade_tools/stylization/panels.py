@@ -7,14 +7,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..artifacts.stylesheet import StyleFace, StyleSheet
+from ..artifacts.stylesheet import StyleBlock, StyleFace, StyleSheet
 from ..geometry.arrays import Booleans, Floats
 from .placing import TOUCH, Placed, face_corners
 from .projection import SIDES
 from .remesh import Slab
 from .splitting import SplitRule
+from .storeys import LEAST_STOREY
 
 SMALL = 0.05  # of a side's area: groups below it take the texture of a large one
+FRAGMENT = 0.5  # of its block: a lower slab may be part of a storey
+STEP = 1.0  # m: below which a ground floor begins
 ALIGNED = 0.9  # shared width over the larger one, for two faces to stand on each other
 
 
@@ -61,11 +64,26 @@ def panels(
             members = walls.get((item.source.id, storey.floor), [])
             for side, face in _widest(members) if storey.boxed else members:
                 corners = face_corners(item, storey, face, side)
-                used = (of_group[face.vertical], of_group[face.horizontal])
+                rows = _rows(of_group[face.horizontal], face, item.source)
+                used = (of_group[face.vertical], rows)
                 panel = _panel(index, side, corners, face, used)
                 if panel is not None and len(seen := _seen(panel, others)):
                     found.append(replace(panel, seen=seen))
     return found
+
+
+def _rows(rule: SplitRule, face: StyleFace, block: StyleBlock) -> SplitRule:
+    """Return the rule by which a face is split into rows.
+
+    A slab that is a fragment of a storey has no storeys to repeat; on the ground the lowest row,
+    of shops and doors, stands once.
+    """
+    height = face.top - face.bottom
+    if height < LEAST_STOREY and height < FRAGMENT * block.size[2]:
+        return SplitRule((rule.size,))
+    if block.role == "bottom" and face.bottom < STEP:
+        return replace(rule, once=tuple(range(len(rule.insertable))[-1:]))
+    return rule
 
 
 def _widest(members: Sequence[tuple[str, StyleFace]]) -> list[tuple[str, StyleFace]]:

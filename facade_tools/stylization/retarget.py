@@ -41,8 +41,8 @@ def retarget(style: Style, target: Blocks, small: float = SMALL, *, flush: bool 
     target's frame.
     """
     chosen = matched_blocks(style.sheet, style.blocks, target)
-    aligned = aligned_rules(style.sheet, style.blocks)
-    style, chosen = with_bays(style, chosen, target)
+    aligned = aligned_rules(style.sheet, style.blocks, style.pictures)
+    style, chosen = with_bays(style, chosen, target, aligned)
     placed = placed_blocks(style.sheet, style.blocks, target, chosen, flush=flush)
     slabs = [placed_slabs(style.sheet, item) for item in placed]
     found = panels(style.sheet, placed, slabs, aligned)

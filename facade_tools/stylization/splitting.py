@@ -27,10 +27,14 @@ MARGINS = 0.5, 3.0  # least and most of their width that margins take
 
 @dataclass(frozen=True, slots=True)
 class SplitRule:
-    """Widths in metres: scalable a_1 … a_{m+1} around insertable b_1 … b_m (eq. 8)."""
+    """Widths in metres: scalable a_1 … a_{m+1} around insertable b_1 … b_m (eq. 8).
+
+    once: the numbers of insertable sections that are not repeated, from 0.
+    """
 
     scalable: tuple[float, ...]
     insertable: tuple[float, ...] = ()
+    once: tuple[int, ...] = ()
 
     @property
     def size(self) -> float:
@@ -154,12 +158,53 @@ def split(rule: SplitRule, size: float, patience: tuple[float, float] = MARGINS)
         return Split((0,), (size,), 0, size / rule.size)
     most = packed(rule, size)
     chosen = _repeated(rule, size, most)
-    if chosen.windows and CROWDED <= chosen.stretch <= 1 / CROWDED:
+    crowded = not chosen.windows or not CROWDED <= chosen.stretch <= 1 / CROWDED
+    if rule.once and size > rule.size and (most > len(rule.insertable) or crowded):
+        return _with_single(rule, size, patience)
+    if not crowded:
         regular = _regular(rule, size, most)
         return _spread(rule, regular if regular.stretch > LEAST_WALLS else chosen, patience)
     options = [_spread(rule, _regular(rule, size, n), patience) for n in range(most + 1, 0, -1)]
+    if rule.once:
+        options = [option for option in options if option.windows <= len(rule.insertable)]
     best = min((o for o in options if o.stretch > TIGHT), key=partial(_change, rule), default=None)
     return _plain(rule, size) if best is None or _bare(rule, size, best) else best
+
+
+def _with_single(rule: SplitRule, size: float, patience: tuple[float, float]) -> Split:
+    """Return a face wider than its rule (m), some of whose windows stand once."""
+    m = len(rule.insertable)
+    usual = [b for k, b in enumerate(rule.insertable) if k not in rule.once]
+    single = math.fsum(rule.insertable[k] for k in rule.once)
+    # what frames a single ornament is none of the row's windows
+    most = m + math.ceil((size - rule.size) / min(usual)) if math.fsum(usual) >= single else m
+    options = (_spread(rule, _inserted(rule, size, n), patience) for n in range(m, most + 1))
+    return min((o for o in options if o.stretch > TIGHT), key=partial(_change, rule))
+
+
+def _inserted(rule: SplitRule, size: float, windows: int) -> Split:
+    """Return a face with at least the rule's windows: those that stand once keep their place.
+
+    The others follow each other in their order, again and again.
+    """
+    m = len(rule.insertable)
+    usual = [k for k in range(m) if k not in rule.once]
+    places = {math.floor((k + 0.5) / m * windows): k for k in rule.once}
+    rest = itertools.cycle(usual)
+    order = [places[i] if i in places else next(rest) for i in range(windows)]
+    walls = [0, *(2 * _between(rule, a, b) for a, b in itertools.pairwise(order)), 2 * m]
+    sections = itertools.chain.from_iterable(
+        (wall, 2 * k + 1) for wall, k in zip(walls, order, strict=False)
+    )
+    return _arranged(rule, size, (*sections, walls[-1]))
+
+
+def _between(rule: SplitRule, first: int, second: int) -> int:
+    """Return the wall between two windows that need not be neighbours in the rule."""
+    last = len(rule.insertable) - 1
+    if (second in rule.once and second > 0) or first == last:
+        return max(second, 1)
+    return first + 1
 
 
 def _bare(rule: SplitRule, size: float, best: Split) -> bool:

@@ -16,6 +16,7 @@ from ..imaging.image_io import Picture
 from .splitting import SplitRule, end_wall, split, variance_signal
 
 PLAIN = 0.5  # of a wall beside windows, that a face without windows is made of
+ROWS, LAYERED = 24, 0.05  # a picture's rows, and their least standard deviation in one of layers
 TOLERATED = 0.1  # stretch of a texture in which no windows were found
 LONG = 3.0  # m: walls that keep the scale of what is on them when they are stretched by more
 SMEARED, FILLED = 2.0, 3.0  # stretch of walls, of long walls, beyond which their texture repeats
@@ -31,7 +32,9 @@ def resized_rule(rule: SplitRule, size: float) -> SplitRule:
     """
     factor = size / rule.size
     return SplitRule(
-        tuple(factor * a for a in rule.scalable), tuple(factor * b for b in rule.insertable)
+        tuple(factor * a for a in rule.scalable),
+        tuple(factor * b for b in rule.insertable),
+        rule.once,
     )
 
 
@@ -134,13 +137,22 @@ def synthesised(
     places = []
     for k in (0, 1):
         count, signal = _pixels(target[k], density), partial(_signal, picture, k)
-        share = positions(rules[k], source[k], target[k], count, signal)
+        if k and not rules[k].insertable and target[k] <= SMEARED * source[k] and _lying(picture):
+            share = (np.arange(count) + 0.5) / count
+        else:
+            share = positions(rules[k], source[k], target[k], count, signal)
         places.append(share * picture.shape[1 - k] - 0.5)
     columns, rows = (p[_cut(*ends, len(p))] for p, ends in zip(places, part, strict=True))
     order = ((rows, 0), (columns, 1)) if len(rows) < picture.shape[0] else ((columns, 1), (rows, 0))
     for line, axis in order:  # first the one that leaves less to the other
         picture = _resampled(picture, line, axis)
     return picture
+
+
+def _lying(picture: Picture) -> bool:
+    """Tell whether a picture shows things above one another, that cannot stand upside down."""
+    rows = cv2.resize(picture, (1, ROWS), interpolation=cv2.INTER_AREA).astype(np.float64) / 255
+    return float(rows.std(axis=0).mean()) >= LAYERED
 
 
 def _signal(picture: Picture, axis: int) -> Floats:

@@ -17,6 +17,7 @@ from facade_tools.geometry.checks import building_problems
 from facade_tools.randomness import item_generator
 from facade_tools.reconstruction.elevation import building_lines, elevation, label_map, stretched
 from facade_tools.reconstruction.engine import Lot
+from facade_tools.reconstruction.facets import faceted
 from facade_tools.reconstruction.reconstruct import Ask, reconstruct
 from facade_tools.reconstruction.surfaces import largest_rectangle, without_rim
 from facade_tools.reconstruction.texture_synthesis import cheapest_cut, joined, quilted
@@ -357,6 +358,51 @@ def test_a_wide_footprint_has_more_axes_and_nothing_is_seen_twice():
         for piece in made.building().facades["front"].pieces
         for element in piece.elements
     )
+
+
+def windows_on(building, side):
+    return [e for p in building.facades[side].pieces for e in p.elements if e.kind == "window"]
+
+
+def test_a_narrow_front_leaves_no_blank_sides():
+    lot = Lot([np.array([[0.0, 0.0], [2.5, 0.0], [2.5, 9.0], [0.0, 9.0]])])
+    made = reconstruct(parsed(), picture(), [lot], rng=rng())
+    building = made.building()
+    assert solid_of(made.scene()).is_watertight
+    assert not list(building_problems(building))
+    for side in ("left", "right", "back", "front"):
+        assert len(windows_on(building, side)) >= 3
+    assert not made.seen
+    widths = [e.width for e in windows_on(building, "left")]
+    assert max(widths) / min(widths) < 1.5
+    assert min(widths) > 0.8  # 1.2 m in the picture
+
+
+def test_curves_of_short_walls_have_axes_that_are_not_squeezed():
+    turn = np.linspace(np.pi, 2 * np.pi, 21)
+    curve = 7.97 * np.column_stack([np.cos(turn), np.sin(turn)])
+    ring = np.concatenate([curve, [[7.97, 10.0], [-7.97, 10.0]]])
+    made = reconstruct(parsed(), picture(), [Lot([ring])], rng=rng())
+    assert solid_of(made.scene()).is_watertight
+    leaves = [x.shape for x in made.derived.leaves if x.shape.symbol.endswith("-window")]
+    assert leaves
+    assert min(shape.scope.size[0] for shape in leaves) > 0.55
+
+
+def test_only_curves_are_faceted():
+    square = np.array([[0.0, 0.0], [8.0, 0.0], [8.0, 8.0], [0.0, 8.0]])
+    jogs = np.array([[0, 0], [8, 0], [8, 5], [7, 5], [7, 6], [8, 6], [8, 8], [0, 8.0]])
+    small = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
+    for ring in (square, jogs, small):
+        assert np.array_equal(faceted(ring), ring)
+    turn = np.linspace(0, 2 * np.pi, 40, endpoint=False)
+    rounded = 8.0 * np.column_stack([np.cos(turn), np.sin(turn)])
+    for first in (0, 1, 7):
+        found = faceted(np.roll(rounded, first, axis=0))
+        lengths = np.hypot(*(np.roll(found, -1, axis=0) - found).T)
+        assert 10 < len(found) < 22
+        assert lengths.max() < 4.0
+        assert set(map(tuple, found)) <= set(map(tuple, rounded))
 
 
 def test_dormers_at_the_picture_s_edge_show_the_photograph():

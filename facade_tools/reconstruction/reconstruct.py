@@ -19,18 +19,20 @@ from .boxed import derived_building
 from .drawing import Look, Painted, derived_scene
 from .elevation import Elevation, elevation, label_map, stretched
 from .engine import Derived, Leaf, Lot, derive
+from .facets import faceted
 from .records import derivation_of
 from .specific import Cover, Design, Specific, specific_grammar
 from .surfaces import (
     TILE_METRES,
     Surfaces,
-    canvas_of,
     colors_of,
     surfaces_of,
+    view_of,
     without_rim,
 )
 from .widening import widened
 
+SQUEEZED = 0.5  # of its width: a facade narrower than that is not put on its wall
 DEPTH = 12.0  # metres, of the default footprint
 
 
@@ -96,29 +98,36 @@ def reconstruct(
 
     photo: the picture that was parsed, (h, w, 3). lots: outlines whose widest side to the front
     (−y) is the parsed facade, of which axes repeat or are left out where the wall is wider or
-    narrower; a lot's height, where not 0, is that of its eaves. Raises
-    InvalidInput where the parse shows no building or the picture is another.
+    narrower, and repeat as on the other sides where it would be squeezed to less than half; a
+    lot's height, where not 0, is that of its eaves. Curves in short walls get walls as wide as an
+    axis. Raises InvalidInput where the parse shows no building or the picture is another.
     """
     ask = ask or Ask()
     labels = label_map(parse)
     picture = without_rim(_rectified(photo, parse, labels.shape))
     plan = elevation(parse, ask.storey_height, ask.height)
-    more = None
+    shown = picture, labels, plan
+    more, squeeze = None, 1.0
     if lots:
+        lots = [replace(lot, rings=[faceted(ring) for ring in lot.rings]) for lot in lots]
         width, top = _front(lots)
         more = widened(labels, width / plan.width * (plan.eaves / top if top else 1.0))
         if more is not None:
             parse, picture = more.parse(parse), more.picture(picture)
             labels, plan = label_map(parse), elevation(parse, ask.storey_height, ask.height)
+        squeeze = width / plan.width * (plan.eaves / top if top else 1.0)
         plan = stretched(plan, width, top)
     else:
         lots = [_rectangle(plan.width, ask.depth)]
     colors = colors_of(picture, labels)
-    surfaces = surfaces_of(canvas_of(picture, labels, plan), plan, colors, rng=rng)
-    design = Design(_roof(plan, ask), surfaces.axes, ask.party, surfaces.colors)
+    own = stretched(shown[2], shown[2].width, plan.eaves)
+    front, sides = view_of(picture, labels, plan), view_of(shown[0], shown[1], own)
+    surfaces = surfaces_of(front, sides, colors, rng=rng)
+    fits = squeeze >= SQUEEZED or not surfaces.axes
+    design = Design(_roof(plan, ask), surfaces.axes, ask.party, surfaces.colors, fits)
     specific = specific_grammar(plan, design, parse.id)
     derived = derive(specific.grammar, lots, rng=rng)
-    return Reconstruction(parse.id, plan, specific, derived, surfaces, more is None)
+    return Reconstruction(parse.id, plan, specific, derived, surfaces, fits and more is None)
 
 
 def _rectified(photo: Picture, parse: Parse, shape: tuple[int, ...]) -> Picture:

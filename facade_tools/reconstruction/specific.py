@@ -50,13 +50,15 @@ class Design:
     """What is not in the picture.
 
     roof: flat, gable, hip or mansard. party: sides without openings. axes: tiles of the other
-    sides, in the order of the side texture. colors: of walls, roof, doors by label.
+    sides, in the order of the side texture. colors: of walls, roof, doors by label. fits: the
+    front is the parsed facade; if it is too narrow for that, axes repeat on it, too.
     """
 
     roof: str
     axes: tuple[Axis, ...]
     party: frozenset[str] = frozenset()
     colors: Mapping[str, str] = field(default_factory=dict)
+    fits: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +73,8 @@ def specific_grammar(plan: Elevation, design: Design, identity: str) -> Specific
     """Return the grammar whose derivation is the building of an elevation."""
     build = _Build(plan, design)
     build.lots()
-    build.front()
+    if design.fits:
+        build.front()
     build.sides()
     build.roof()
     grammar = ShapeGrammar(
@@ -117,7 +120,8 @@ class _Build:
         self.terminal("Party", "wall", Cover(WALL))
         parsed = f"side == 'front' and abs(width - {self.plan.width:.9g}) < {NEARLY}"
         same = f"abs(height - {self.plan.eaves:.9g}) < {NEARLY}"
-        self.rule("Facade", Operation(into="Parsed"), when=f"{parsed} and {same}")
+        if self.design.fits:
+            self.rule("Facade", Operation(into="Parsed"), when=f"{parsed} and {same}")
         self.rule("Facade", Operation(into="Unseen"), when=OTHERWISE)
 
     def _stack(self, number: int, rect: Rect) -> Operation:
@@ -273,7 +277,7 @@ class _Build:
         if style in ("gable", "mansard") and gables:
             operation = replace(operation, weights=gables)
         self.rule("Roof", operation)
-        shown = self.plan.loft > 0 and style != "flat"
+        shown = self.design.fits and self.plan.loft > 0 and style != "flat"
         wide = f"side == 'front' and abs(width - {self.plan.width:.9g}) < {NEARLY}"
         self.rule("Lower", Operation(into="Slope"), when=OTHERWISE)
         if shown:

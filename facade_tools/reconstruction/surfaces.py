@@ -57,6 +57,14 @@ class Canvas:
 
 
 @dataclass(frozen=True, slots=True)
+class View:
+    """An elevation and the part of the photograph that shows it."""
+
+    canvas: Canvas
+    plan: Elevation
+
+
+@dataclass(frozen=True, slots=True)
 class Surfaces:
     """Textures by name as materials, colours by label, and the axes of the unseen sides."""
 
@@ -65,8 +73,8 @@ class Surfaces:
     axes: tuple[Axis, ...]
 
 
-def canvas_of(photo: Picture, labels: Labels, plan: Elevation) -> Canvas:
-    """Return the part of a rectified photograph that an elevation shows.
+def view_of(photo: Picture, labels: Labels, plan: Elevation) -> View:
+    """Return an elevation with the part of a rectified photograph that shows it.
 
     photo: (h, w, 3); labels: its label map, of the same shape.
     """
@@ -76,22 +84,27 @@ def canvas_of(photo: Picture, labels: Labels, plan: Elevation) -> Canvas:
     size = (max(1, round(part.shape[1] * factor)), max(1, round(part.shape[0] * factor)))
     picture = np.asarray(cv2.resize(part, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
     index = np.asarray(cv2.resize(own, size, interpolation=cv2.INTER_NEAREST), dtype=np.uint8)
-    return Canvas(picture, index, (size[0] / plan.width, size[1] / (plan.eaves + plan.loft)))
+    scale = size[0] / plan.width, size[1] / (plan.eaves + plan.loft)
+    return View(Canvas(picture, index, scale), plan)
 
 
 def surfaces_of(
-    canvas: Canvas, plan: Elevation, colors: Mapping[str, str], *, rng: np.random.Generator
+    front: View, sides: View, colors: Mapping[str, str], *, rng: np.random.Generator
 ) -> Surfaces:
-    """Return all textures of a reconstruction; colors: of the labels (see `colors_of`)."""
-    clean = replace(canvas, picture=_cleaned(canvas, plan))
-    axes, strips = _axes(clean, plan)
-    pictures = {PHOTO: canvas.picture, FRONT: clean.picture}
+    """Return all textures of a reconstruction.
+
+    front: as it is fitted to its wall; sides: as the picture shows it, what the others are made
+    of, of the same height. colors: of the labels (see `colors_of`).
+    """
+    pictures = {PHOTO: front.canvas.picture, FRONT: _cleaned(front.canvas, front.plan)}
+    clean = replace(sides.canvas, picture=_cleaned(sides.canvas, sides.plan))
+    axes, strips = _axes(clean, sides.plan)
     if strips:
         pictures[SIDE] = joined(strips, _margin(clean, axes[0].width))
     for name, label in ((WALL, "wall"), (ROOF, "roof")):
         exemplars = list(_exemplars(clean, LABELS.index(label)))
         if exemplars:
-            scaled = [_resampled(e, TILE / TILE_METRES / canvas.scale[0]) for e in exemplars]
+            scaled = [_resampled(e, TILE / TILE_METRES / clean.scale[0]) for e in exemplars]
             block = int(np.clip(min(min(e.shape[:2]) for e in scaled), LEAST_BLOCK, TILE // 4))
             pictures[name] = quilted(scaled, (TILE, TILE), block, rng=rng)
     materials = {

@@ -216,3 +216,24 @@ def test_the_plain_wall_repeats_without_seams(style):
 def test_the_validator_finds_nothing(style):
     issues = khronos_issues(gltf.write([dressed(style, house(Roof("gable", 40, "y")))], "x"))
     assert (issues["numErrors"], issues["numWarnings"]) == (0, 0), issues["messages"][:3]
+
+
+def winding(solid, point):
+    """Return how often a solid's surface winds around a point: 1 inside, 0 outside."""
+    a, b, c = np.moveaxis(solid.triangles - np.array(point), 1, 0)
+    la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
+    volume = (a * np.cross(b, c)).sum(axis=1)
+    near = la * lb * lc + (a * b).sum(1) * lc + (b * c).sum(1) * la + (c * a).sum(1) * lb
+    return float(np.arctan2(volume, near).sum() / (2 * np.pi))
+
+
+def test_niches_right_under_a_roof_are_closed_below_it():
+    boxes = [((0, 0.4, 0), (20, 12, 6)), ((0, 0, 0), (8, 0.4, 6)), ((12, 0, 0), (20, 0.4, 6))]
+    niche = style_of(joined([textured_box(low, high) for low, high in boxes]), front=180.0)
+    building = Building("house", (Box("a", "general", 10, 6, 20, 12, 6.0, Roof("hip", 30.0)),))
+    scene = flushed(niche, building)
+    mass = scene.meshes[0]
+    solid = trimesh.Trimesh(mass.vertices, mass.faces, process=False)
+    assert solid.is_watertight
+    inside = [round(winding(solid, (10.0, 0.2, z))) for z in (3.0, 5.7, 5.9)]
+    assert inside == [0, 0, 1]

@@ -16,7 +16,7 @@ import numpy as np
 from ..artifacts.blocks import Block, Blocks
 from ..artifacts.stylesheet import StyleBlock, StyleFace, StyleSheet
 from ..geometry.arrays import Floats
-from .remesh import Slab, trimmed
+from .remesh import Slab, on_grid, trimmed
 from .snapping import snapped
 from .storeys import Storey, cells, storeys
 from .structure import candidates, match_blocks
@@ -26,6 +26,7 @@ SUPPORT = 0.9  # of the distance of the outer boundaries: thickness of a wall un
 FLUSH = 0.05  # m: walls nearer than that stand in one plane, and thinning would take all relief
 OUTER = 0.25  # of a block, in which the plane of most wall is looked for
 FULL = 0.9  # of a block's plan, that a floor under a roof made for the block must fill
+LINTEL = 0.2  # m: over niches right under a roof
 LEDGE = 0.25  # m: cornices and bases stand at most so far before a wall that is flush
 Knots = tuple[Floats, Floats]
 
@@ -87,7 +88,11 @@ def placed_blocks(
     for lower, upper in order:
         if not _native(own, placed[lower], placed[upper]):
             placed[upper] = _snapped(sheet, placed[lower], placed[upper])
-    return [_boxed(sheet, item) for item in placed] if flush else placed
+    if not flush:
+        return placed
+    covered = {lower for lower, _ in _stacked(placed)}
+    filled = [_boxed(sheet, item) for item in placed]
+    return [item if k in covered else _closed(item) for k, item in enumerate(filled)]
 
 
 def foreign_blocks(own: Blocks, placed: Sequence[Placed]) -> list[int]:
@@ -105,9 +110,24 @@ def placed_slabs(sheet: StyleSheet, placed: Placed) -> list[Slab]:
         if storey.boxed:
             sides = _sides(placed.target)
             plan = Slab(storey.bottom, storey.top, *sides, np.ones((1, 1), dtype=bool))
-        if plan.cells.any():
-            slabs.append(plan)
+        if not plan.cells.any():
+            continue
+        closed = _with_box(plan, *_sides(placed.target)) if storey.lintel else plan
+        if closed.area > plan.area + TOUCH:
+            foot = storey.top - storey.lintel
+            slabs.append(replace(plan, top=foot))
+            plan = replace(closed, bottom=foot)
+        slabs.append(plan)
     return slabs
+
+
+def _with_box(plan: Slab, xs: Floats, ys: Floats) -> Slab:
+    """Return a plan with a box (its ends along x and y) added to it."""
+    lines, rows = np.union1d(plan.xs, xs), np.union1d(plan.ys, ys)
+    x, y = (0.5 * (v[1:] + v[:-1]) for v in (lines, rows))
+    inside = ((y > ys[0]) & (y < ys[-1]))[:, None] & ((x > xs[0]) & (x < xs[-1]))
+    whole = Slab(plan.bottom, plan.top, lines, rows, on_grid(plan, lines, rows) | inside)
+    return _without_nothing(whole)
 
 
 def _sides(block: Block) -> tuple[Floats, Floats]:
@@ -163,6 +183,14 @@ def _boxed(sheet: StyleSheet, placed: Placed) -> Placed:
         )
         found.append(replace(storey, boxed=bool(depths @ cells(floor) @ widths < least)))
     return replace(placed, storeys=tuple(found))
+
+
+def _closed(placed: Placed) -> Placed:
+    """Close niches of the highest storey below its top."""
+    *rest, last = placed.storeys
+    if last.boxed or last.top - last.bottom < 2 * LINTEL:
+        return placed
+    return replace(placed, storeys=(*rest, replace(last, lintel=LINTEL)))
 
 
 def _main_plane(sheet: StyleSheet, block: str, side: str, size: float) -> float:

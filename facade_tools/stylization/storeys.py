@@ -22,13 +22,15 @@ MOSTLY = 0.5  # of a block's height, that storeys in such a model make up
 class Storey:
     """A floor of the source put between two heights of the target (m, absolute).
 
-    boxed: it fills its block, and each side shows one face.
+    boxed: it fills its block, and each side shows one face. lintel: height (m) below its top in
+    which it fills its block, so that a roof stands on it.
     """
 
     floor: int
     bottom: float
     top: float
     boxed: bool = False
+    lintel: float = 0.0
 
 
 def cells(floor: StyleFloor) -> np.ndarray:

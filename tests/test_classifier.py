@@ -391,6 +391,8 @@ def test_train_parser_end_to_end(facade, pairs, tmp_path):
     assert high.returncode == 2
     assert b"--coarse 97 is above --height 96" in high.stderr
     start = ("--start", out)
-    bare = facade("train-parser", tmp_path / "images", tmp_path / "labels", *start, "-o", out)
+    bare = facade(
+        "train-parser", tmp_path / "images", tmp_path / "labels", *start, "-o", tmp_path / "b.npz"
+    )
     assert bare.returncode == 3
     assert b"model.npz: holds no network to start from" in bare.stderr

@@ -206,7 +206,7 @@ def test_planted_fault_is_found(fault: str) -> None:
     assert any(p.pointer == pointer and words in p.message for p in found), found
 
 
-@pytest.mark.parametrize("fault", FAULTS.keys() - {"no main door", "main door upstairs"})
+@pytest.mark.parametrize("fault", sorted(FAULTS.keys() - {"no main door", "main door upstairs"}))
 def test_planted_fault_is_the_only_one(fault: str) -> None:
     plant, pointer, _ = FAULTS[fault]
     beside = {"piece of no box", "wrong wall", "box id twice"}  # leave other walls over, too

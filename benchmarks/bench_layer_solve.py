@@ -21,7 +21,7 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 from layering_checks import compared  # noqa: E402
 from layering_designs import random_direction, words_of  # noqa: E402
-from layering_language import drawn  # noqa: E402
+from layering_documents import drawn  # noqa: E402
 from layering_oracle import TooLarge, best, best_of  # noqa: E402
 
 from facade_tools.artifacts.store import read_one  # noqa: E402

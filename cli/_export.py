@@ -99,11 +99,7 @@ def _to_folder(stream: StreamOptions, folder: Path, convert: Files) -> None:
     faults = Faults("export", stream.on_error)
     seen: dict[str, str] = {}
     for identity, files in each(convert, stream, faults):
-        try:
-            new_file_name(identity, seen)
-        except InvalidInput as error:
-            faults(error)
-        else:
+        if faults.guard(new_file_name, identity, seen) is not None:
             write_files(folder, files)
     faults.complain()
 

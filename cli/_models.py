@@ -61,15 +61,16 @@ def write_models(
     output, tree = outputs
     seen: set[str] = set()
     with _opened(output) as write, _trees(tree) as write_tree:
+
+        def put(made: Made) -> None:
+            if made.id in seen:
+                raise InvalidInput(f"id {made.id!r} stands twice; expected unique ids")
+            seen.add(made.id)
+            write_tree(made)
+            write(made)
+
         for made in results:
-            try:
-                if made.id in seen:
-                    raise InvalidInput(f"id {made.id!r} stands twice; expected unique ids")
-                seen.add(made.id)
-                write_tree(made)
-                write(made)
-            except InvalidInput as error:
-                faults(error)
+            faults.guard(put, made)
 
 
 @contextmanager

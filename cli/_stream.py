@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TypeVar
 
 import click
 
@@ -23,6 +23,8 @@ from facade_tools.randomness import item_generator
 
 from ._options import StreamOptions
 from ._report import Message, Progress, ReaderLeft, collected_log, say_error, show_messages
+
+R = TypeVar("R")
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,12 +95,13 @@ class Faults:
         say_error(self.stage, error)
         self.count += 1
 
-    def guard(self, write: Callable[[str, bytes], None], identity: str, data: bytes) -> None:
-        """Write an artifact; an id that cannot be written is a fault of its item."""
+    def guard(self, work: Callable[..., R], *given: Any) -> R | None:
+        """Return what `work` makes of its arguments; None where what it refuses was taken."""
         try:
-            write(identity, data)
+            return work(*given)
         except InvalidInput as error:
             self(error)
+            return None
 
     def complain(self) -> None:
         """Raise InvalidInput if anything was left out."""

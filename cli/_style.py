@@ -11,7 +11,6 @@ from math import inf
 from pathlib import Path
 
 import click
-import numpy as np
 
 from facade_tools.artifacts.blocks import Blocks
 from facade_tools.artifacts.building import Building
@@ -20,7 +19,7 @@ from facade_tools.artifacts.provenance import Provenance
 from facade_tools.artifacts.store import RawItem, digest, read_raw
 from facade_tools.artifacts.writing import atomic_folder
 from facade_tools.errors import InvalidInput
-from facade_tools.formats.exporting import FAR, model_files, near_origin
+from facade_tools.formats.exporting import model_files, near_origin
 from facade_tools.formats.mesh_reader import ENDINGS, STATED, read_textured
 from facade_tools.formats.style_folder import read_style, write_style
 from facade_tools.formats.textured import TexturedMesh
@@ -28,6 +27,7 @@ from facade_tools.geometry.arrays import Floats
 from facade_tools.geometry.mesh import Scene
 from facade_tools.randomness import item_generator
 from facade_tools.stylization.bases import (
+    brought_near,
     building_blocks,
     check_blocks,
     layout_blocks,
@@ -124,7 +124,7 @@ class Dresser:
     ) -> tuple[str, Scene, Floats]:
         """Return id, scene and the shift; plain: may the base be given a bottom and a top."""
         check_blocks(base)
-        base, building, step = _brought_near(base, building)
+        base, building, step = brought_near(base, building)
         blocks = resized(base, self.sizes) if self.sizes else base
         rng = item_generator(self.seed, "retarget", base.id)
         chosen = self.styles[
@@ -137,26 +137,6 @@ class Dresser:
         if building is not None and roofed:
             scene = crowned(scene, chosen, building)
         return base.id, scene, step
-
-
-def _brought_near(
-    base: Blocks, building: Building | None
-) -> tuple[Blocks, Building | None, Floats]:
-    """Return a base whose frame has no far shift, and that shift (3,), m.
-
-    What is computed and compared in single precision would be a ruin at a map's coordinates.
-    """
-    step: Floats = np.zeros(3)
-    if base.frame is None:
-        return base, building, step
-    frame = np.array(base.frame, dtype=np.float64)
-    if np.abs(frame[:3, 3]).max() <= FAR:
-        return base, building, step
-    step, frame[:3, 3] = frame[:3, 3].copy(), 0.0
-    base = replace(base, frame=tuple(tuple(row) for row in frame.tolist()))
-    if building is not None and building.frame is not None:
-        building = replace(building, frame=replace(building.frame, shift=(0.0, 0.0, 0.0)))
-    return base, building, step
 
 
 def run_retarget(
@@ -178,12 +158,10 @@ def run_retarget(
     dresser = Dresser(sheets, sizes, small, stream.seed or 0, meshes)
     faults = Faults("retarget", stream.on_error)
     seen: dict[str, str] = {}
-    origin: Floats = np.zeros(3)
+    origin: Floats | None = None
     for identity, scene, step in each(dresser, stream, faults, sources):
-        try:
-            name = new_file_name(identity, seen)
-        except InvalidInput as error:
-            faults(error)
+        name = faults.guard(new_file_name, identity, seen)
+        if name is None:
             continue
         scene, origin = near_origin(scene, step, origin)
         folder, stem = (

@@ -1,68 +1,33 @@
-"""facadegen: exact sizing, sound facades that meet their targets, completion, library, colours."""
+"""facadegen: exact sizing, sound facades that meet their targets, completion, roofs."""
 
 from __future__ import annotations
 
 import json
 from dataclasses import replace
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 import pytest
+from facade_houses import HOUSES, bare, elements, made, sample
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from facade_tools.artifacts.attributes import FacadeAttributes
-from facade_tools.artifacts.building import SIDES, Box, Building, Colors, Element, Facade, Roof
+from facade_tools.artifacts.building import SIDES, Box, Building, Element, Facade, Roof
 from facade_tools.artifacts.documents import encode
 from facade_tools.artifacts.numbers import dump_line
 from facade_tools.artifacts.store import read
 from facade_tools.errors import Infeasible, InvalidInput
 from facade_tools.exteriors.attributes import building_attributes
 from facade_tools.exteriors.facade_energy import energy
-from facade_tools.exteriors.facade_layout import WIDE_WALL
 from facade_tools.exteriors.facade_sizing import sized
-from facade_tools.exteriors.facadegen import FacadeOptions, generate_facades
 from facade_tools.exteriors.genetic import Search
-from facade_tools.exteriors.library import (
-    ElementLibrary,
-    build_library,
-    default_library,
-    kmeans,
-)
-from facade_tools.exteriors.palette import house_colors
 from facade_tools.geometry.blocked import wall_of
 from facade_tools.geometry.checks import building_problems
 from facade_tools.geometry.pieces import facade_pieces
 from facade_tools.geometry.solids import building_solid, triangulated
 
-ROOT = Path(__file__).parent.parent
-HOUSES = ROOT / "sample_data" / "houses"
 STYLES = ("bungalow", "two_storey_gable", "victorian", "modern_flat", "split_garage")
-
-
-def sample(style: str, number: int = 0) -> Building:
-    return list(read([str(HOUSES / f"{style}.jsonl")], "building"))[number]
-
-
-def bare(building: Building) -> Building:
-    """The mass of a house with its own attributes as targets."""
-    targets = building_attributes(building)
-    return replace(building, facades={}, targets=targets, colors=None, energy=None)
-
-
-def made(building: Building, seed: int = 0, **options) -> list[Building]:
-    rng = np.random.default_rng(seed)
-    return list(generate_facades(building, FacadeOptions(**options), rng=rng))
-
-
-def elements(building: Building):
-    return [
-        (side, piece, element)
-        for side, facade in building.facades.items()
-        for piece in facade.pieces
-        for element in piece.elements
-    ]
 
 
 # --- sizing -------------------------------------------------------------------------------------
@@ -343,117 +308,6 @@ def test_no_sample_house_has_a_window_sunk_in_a_roof():
         assert [house.id for house in houses if sunk(house)] == []
 
 
-# --- sidelights ---------------------------------------------------------------------------------
-
-
-def slim(element):
-    return element.kind == "window" and element.height > 3.0 * element.width
-
-
-def library_with(width: float, sidelights: bool, others: float):
-    """A library of one house: windows of one size all round, perhaps a pair beside the door."""
-    house = bare(sample("colonial"))
-    facades = {}
-    for side, pieces in facade_pieces(house).items():
-        row = []
-        for piece in pieces:
-            found = []
-            if piece.width > 4 and piece.height > 2.3:
-                tall = 1.8
-                count = int(piece.width // 2)
-                found = [
-                    Element("window", "fixed", (k + 0.5) * piece.width / count, 0.4, others, tall)
-                    for k in range(count)
-                ]
-                if side == "front" and piece.origin[2] == 0 and sidelights:
-                    middle = piece.width / 2
-                    door = Element("door", "panel", middle - 0.45, 0.0, 0.9, 2.1, True)
-                    lights = [
-                        Element("window", "fixed", middle + u, 0.3, width, 1.8)
-                        for u in (-0.95, 0.6)
-                    ]
-                    found = [door, *lights]
-            row.append(replace(piece, elements=tuple(found)))
-        facades[side] = Facade(tuple(row))
-    return ElementLibrary(build_library([replace(house, facades=facades, targets=None)]))
-
-
-def test_sidelights_stand_beside_the_main_door_and_nowhere_else():
-    shelf = library_with(0.35, True, 1.0)
-    beside = 0
-    for seed in range(12):
-        (done,) = made(bare(sample("colonial", seed)), seed, library=shelf)
-        assert list(building_problems(done)) == []
-        for _, piece, element in elements(done):
-            if not slim(element) or piece.width <= WIDE_WALL:
-                continue
-            doors = [e for e in piece.elements if e.main]
-            assert len(doors) == 1
-            gap = max(doors[0].u - element.u - element.width, element.u - doors[0].u - 0.9)
-            assert 0 < gap < 0.4
-            beside += 1
-    assert beside >= 8
-
-
-def test_a_library_of_slim_windows_alone_still_fills_walls():
-    shelf = library_with(0.35, False, 0.45)
-    (done,) = made(bare(sample("colonial", 1)), library=shelf)
-    windows = [e for _, _, e in elements(done) if e.kind == "window"]
-    assert len(windows) > 10
-    assert sum(map(slim, windows)) > 5
-
-
-# --- library and colours ------------------------------------------------------------------------
-
-
-def test_kmeans_finds_separated_groups():
-    rng = np.random.default_rng(0)
-    centres = np.array([[0, 0], [5, 0], [0, 5], [5, 5.0]])
-    points = np.concatenate([c + rng.normal(0, 0.1, (30, 2)) for c in centres])
-    found, label = kmeans(points, 4)
-    assert sorted(np.round(found).tolist()) == sorted(centres.tolist())
-    assert sorted(np.bincount(label).tolist()) == [30] * 4
-
-
-def test_library_has_at_most_five_sizes_a_style():
-    library = default_library().library
-    counts: dict[tuple[str, str], int] = {}
-    for row in library.substyles:
-        counts[row.kind, row.style] = counts.get((row.kind, row.style), 0) + 1
-    assert max(counts.values()) == 5
-    assert len(library.buildings) == 288
-
-
-def test_shipped_library_is_that_of_the_sample_houses():
-    library = build_library(read([str(HOUSES)], "building"), "library")
-    shipped = ROOT / "facade_tools" / "exteriors" / "library.json"
-    assert (
-        json.loads(dump_line(encode(library)))["buildings"]
-        == (json.loads(shipped.read_bytes())["buildings"])
-    )
-
-
-def test_similar_building_has_the_same_bits():
-    shelf = default_library()
-    wanted = building_attributes(sample("victorian", 5))
-    for entry in shelf.nearest(wanted, 3, np.random.default_rng(0)):
-        assert entry.id.startswith("victorian")
-
-
-def test_library_of_windowless_buildings_is_refused():
-    with pytest.raises(InvalidInput, match="window"):
-        build_library([Building("b", (Box("a", "general", 0, 0, 8, 8, 3, Roof("flat")),))])
-
-
-def test_colours_come_from_the_template_and_given_ones_stay():
-    entry = default_library().library.buildings[0]
-    colors = house_colors([entry], rng=np.random.default_rng(0))
-    assert (colors.trim, colors.door) == (entry.colors.trim, entry.colors.door)
-    given_colors = Colors("#112233", "#445566", "#778899", "#aabbcc")
-    (house,) = made(replace(bare(sample("cape")), colors=given_colors))
-    assert house.colors == given_colors
-
-
 # --- command ------------------------------------------------------------------------------------
 
 
@@ -475,68 +329,3 @@ def test_pieces_of_the_result_are_those_of_the_mass():
     for side, pieces in facade_pieces(house).items():
         stripped = tuple(replace(p, elements=()) for p in house.facades[side].pieces)
         assert stripped == pieces
-
-
-# --- designs ------------------------------------------------------------------------------------
-
-
-def test_design_takes_the_place_of_the_front_with_its_door(facade, tmp_path):
-    mass = tmp_path / "mass.jsonl"
-    mass.write_bytes(dump_line(encode(bare(sample("colonial")))))
-    design = ROOT / "sample_data" / "designs" / "house-front.yaml"
-    out = tmp_path / "house.jsonl"
-    done = facade("facadegen", mass, "--design", f"front:{design}", "-o", out)
-    assert done.returncode == 0, done.stderr
-    (house,) = read([str(out)], "building")
-    assert list(building_problems(house)) == []
-    front = [e for side, _, e in elements(house) if side == "front"]
-    assert [e.main for e in front if e.kind == "door"] == [True]
-    assert len({round(e.width, 6) for e in front if e.kind == "window" and e.style == "sash"}) >= 1
-    assert {side for side, *_ in elements(house)} == set(SIDES)
-
-
-def door_design(width: float, height: float) -> list[Element]:
-    door = Element("door", "panel", width / 2 - 0.5, 0.0, 1.0, 2.1, main=True)
-    return [door, Element("window", "sash", 0.5, 1.0, 0.8, 1.0)]
-
-
-def test_main_door_is_in_the_front_where_other_sides_are_designed():
-    mass = bare(sample("split_garage"))
-    (house,) = made(mass, designs=dict.fromkeys(SIDES, door_design))
-    assert list(building_problems(house)) == []
-    assert [side for side, _, e in elements(house) if e.main] == ["front"]
-    assert {side for side, _, e in elements(house) if e.kind == "door" and e.known} == set(SIDES)
-
-
-def test_garage_beside_a_designed_wall_has_its_door():
-    mass = bare(sample("split_garage"))
-    (house,) = made(mass, designs={"front": door_design})
-    assert [side for side, _, e in elements(house) if e.kind == "garage-door"] == ["front"]
-
-
-def test_piece_that_loses_its_whole_design_is_generated():
-    mass = bare(sample("colonial"))
-    (house,) = made(
-        mass, designs={"front": lambda w, h: [Element("window", "sash", 1, 0.5, 1, h - 1)]}
-    )
-    assert list(building_problems(house)) == []
-    assert all(piece.elements for piece in house.facades["front"].pieces)
-
-
-def test_observed_side_cannot_be_designed():
-    house = sample("colonial")
-    keep = replace(house, partial=True, facades={"front": house.facades["front"]})
-    with pytest.raises(InvalidInput, match="front was observed"):
-        made(bare(house), keep=keep, designs={"front": door_design})
-
-
-def test_front_that_takes_no_main_door_is_reported(caplog):
-    thin = Building("thin", (Box("main", "general", 0.4, 4, 0.8, 8, 3, Roof("flat", 0, "x")),))
-    made(thin)
-    assert "no main door" in caplog.text
-
-
-def test_design_of_no_side_is_refused(facade):
-    done = facade("facadegen", HOUSES / "cape.jsonl", "--design", "roof:x.yaml")
-    assert done.returncode == 3
-    assert b"SIDE:DESIGN" in done.stderr

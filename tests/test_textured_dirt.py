@@ -7,6 +7,7 @@ import struct
 import cv2
 import numpy as np
 import pytest
+from hypothesis import strategies as st
 from test_stylization import BOX, DEPTH, HEIGHT, WIDTH, style_of, textured_box, turned
 
 from facade_tools.errors import InvalidInput
@@ -17,6 +18,19 @@ from facade_tools.stylization.remesh import slabs
 from facade_tools.stylization.retarget import retarget
 
 VOLUME = WIDTH * DEPTH * HEIGHT
+
+
+def read_damaged(path, data, most):
+    """Change up to `most` bytes of a mesh file and cut it: it is refused, or read as numbers."""
+    whole = bytearray(path.read_bytes())
+    for _ in range(data.draw(st.integers(1, most))):
+        whole[data.draw(st.integers(0, len(whole) - 1))] = data.draw(st.integers(0, 255))
+    path.write_bytes(bytes(whole[: data.draw(st.integers(1, len(whole)))]))
+    try:
+        mesh = read_textured(path)
+    except InvalidInput:
+        return
+    assert np.isfinite(mesh.vertices).all()
 
 
 def volume(mesh):

@@ -14,7 +14,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
-from test_textured_dirt import png
+from test_textured_dirt import png, read_damaged
 
 from facade_tools.errors import InvalidInput
 from facade_tools.formats.mesh_reader import read_textured
@@ -95,16 +95,9 @@ def test_colours_of_vertices_paint_a_ply(tmp_path):
 @settings(max_examples=60, deadline=None)
 @given(st.sampled_from(["ascii", "binary_little_endian"]), st.data())
 def test_a_damaged_ply_is_refused_or_read(tmp_path_factory, encoding, data):
-    whole = bytearray(ply(encoding, "face"))
-    for _ in range(data.draw(st.integers(1, 3))):
-        whole[data.draw(st.integers(0, len(whole) - 1))] = data.draw(st.integers(0, 255))
     path = tmp_path_factory.mktemp("ply") / "x.ply"
-    path.write_bytes(bytes(whole[: data.draw(st.integers(1, len(whole)))]))
-    try:
-        mesh = read_textured(path)
-    except InvalidInput:
-        return
-    assert np.isfinite(mesh.vertices).all()
+    path.write_bytes(ply(encoding, "face"))
+    read_damaged(path, data, 3)
 
 
 @pytest.mark.parametrize("line", ["v nan 0 1", "v 1 inf 0", "v 1 2"])

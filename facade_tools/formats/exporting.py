@@ -82,12 +82,13 @@ def _origin(low: Floats) -> Floats:
     return origin
 
 
-def near_origin(scene: Scene, step: Floats, origin: Floats) -> tuple[Scene, Floats]:
+def near_origin(scene: Scene, step: Floats, origin: Floats | None) -> tuple[Scene, Floats]:
     """Return a scene shifted by `step` (m) as seen from an origin, and that origin.
 
-    origin: of the scenes before it, that files of one folder fit together. Where the scene stands
-    over 10 km from it, it is a new one, with a warning.
+    origin: of the scenes before it, that files of one folder fit together; None is 0. Where the
+    scene stands over 10 km from it, it is a new one, with a warning.
     """
+    origin = np.zeros(3) if origin is None else origin
     box = bounds(scene) + step
     if np.abs(box - origin).max() > FAR and (_origin(box[0]) != origin).any():
         origin = _origin(box[0])

@@ -12,6 +12,7 @@ from ..artifacts.blocks import Block, BlockRole, Blocks
 from ..artifacts.building import Box, Building
 from ..artifacts.layout import Layout
 from ..errors import InvalidInput
+from ..formats.exporting import FAR
 from ..formats.textured import TexturedMesh
 from ..geometry.arrays import Floats
 from .model import CaptureOptions, modelled
@@ -187,3 +188,21 @@ def mesh_blocks(mesh: TexturedMesh, identity: str, up: str = "auto") -> Blocks:
     up: its upward axis, "y" or "z"; "auto" asks the textures.
     """
     return modelled(mesh, identity, CaptureOptions(up=up)).blocks
+
+
+def brought_near(base: Blocks, building: Building | None) -> tuple[Blocks, Building | None, Floats]:
+    """Return a base whose frame has no far shift, and that shift (3,), m.
+
+    What is computed and compared in single precision would be a ruin at a map's coordinates.
+    """
+    step: Floats = np.zeros(3)
+    if base.frame is None:
+        return base, building, step
+    frame = np.array(base.frame, dtype=np.float64)
+    if np.abs(frame[:3, 3]).max() <= FAR:
+        return base, building, step
+    step, frame[:3, 3] = frame[:3, 3].copy(), 0.0
+    base = replace(base, frame=tuple(tuple(row) for row in frame.tolist()))
+    if building is not None and building.frame is not None:
+        building = replace(building, frame=replace(building.frame, shift=(0.0, 0.0, 0.0)))
+    return base, building, step

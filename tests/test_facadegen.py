@@ -128,6 +128,23 @@ def test_garage_gets_its_door_and_the_front_its_entrance():
     assert mains == [("front", 0.0)]
 
 
+@pytest.mark.parametrize("deeper", [0.0, 0.4])
+def test_main_door_stands_behind_the_porch_whatever_the_targets(deeper):
+    """Also where sampled measures put the porch at one end, or some way into the house."""
+    for number in range(4):
+        house, other = bare(sample("farmhouse", number)), bare(sample("farmhouse", number + 8))
+        porch = next(box for box in house.boxes if box.kind == "porch" and box.y < 0)
+        wall = next(
+            p for p in facade_pieces(house)["front"] if abs(porch.x - p.origin[0]) < p.width
+        )
+        narrow = replace(porch, x=wall.origin[0] + 1.5, y=porch.y + deeper, width=2.0)
+        boxes = tuple(narrow if box is porch else box for box in house.boxes)
+        (done,) = made(replace(house, boxes=boxes, targets=other.targets))
+        ((piece, door),) = [(piece, e) for _, piece, e in elements(done) if e.main]
+        middle = piece.origin[0] + door.u + door.width / 2
+        assert abs(middle - narrow.x) <= narrow.width / 2 - 0.5 + 1e-9
+
+
 def test_without_targets_the_library_gives_them():
     (house,) = made(replace(bare(sample("cape")), targets=None))
     assert list(building_problems(house)) == []

@@ -15,6 +15,7 @@ DOOR = (0.95, 2.1)  # a door where the library has none (m)
 DOOR_WEIGHT = 3.0  # doors beside the main one are few: drawn this much more often than counted
 BESIDE_DOOR = 0.25  # least wall between the main door and its piece's border (m)
 OVER_DOOR = 0.1  # least wall over the main door (m)
+LEAST_PORCH = 0.3  # how far a porch stands out where it shelters a door (m)
 LEAST_DOOR = 1.5  # height to which it shrinks where the whole front is low (m)
 USUAL_HEADS = (2.15, 2.1)  # where the library's building has no window (m)
 
@@ -45,13 +46,17 @@ class Codes:
 
 @dataclass(frozen=True, slots=True)
 class MainDoor:
-    """Where the main door may be: piece, range of its centre (m), substyle, share in the middle."""
+    """Where the main door may be: piece, range of its centre (m), substyle, share in the middle.
+
+    A door that is `sheltered` stands behind a porch, and goes before all that are not.
+    """
 
     piece: int = -1
     low: float = 0.0
     high: float = 0.0
     sub: int = 0
     middle: float = 0.0
+    sheltered: bool = False
 
 
 def part_rows(library: Library, entry: LibraryBuilding) -> list[PartRow]:
@@ -152,7 +157,7 @@ def main_doors(
         if porch is not None and sheltered:
             low, high = max(low, porch[0]), min(high, porch[1])
         rank = kinds[piece.box] != "general", not sheltered, -piece.width
-        found.append((rank, MainDoor(p, low, high, sub, 0.6 if sheltered else 0.3)))
+        found.append((rank, MainDoor(p, low, high, sub, 0.6 if sheltered else 0.3, sheltered)))
         if sheltered:  # should posts and roofs leave no place behind the porch
             found.append(((rank[0], True, -piece.width), anywhere))
     return [door for _, door in sorted(found, key=lambda row: row[0])]
@@ -162,8 +167,8 @@ def _porch_range(building: Building, piece: Piece) -> tuple[float, float] | None
     """Return where along a front piece a porch shelters the wall, half a metre in from its ends."""
     x, y = wall_of("front", piece).start
     for box in building.boxes:
-        touches = abs(box.y + box.depth / 2 - y) < 0.05
-        if box.kind == "porch" and touches:
+        before = box.y - box.depth / 2 <= y - LEAST_PORCH and y < box.y + box.depth / 2 + 0.05
+        if box.kind == "porch" and before:
             low, high = box.x - box.width / 2 - x + 0.5, box.x + box.width / 2 - x - 0.5
             if low <= high and high > 0 and low < piece.width:
                 return low, high

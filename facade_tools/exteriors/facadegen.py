@@ -221,14 +221,17 @@ class _Attempt:
         self, plain: SearchSide, doors: Sequence[MainDoor], targets: Floats
     ) -> tuple[Solution, int]:
         """Return the best layout of a side over the walls that may take the main door."""
-        best, main, homeless = None, -1, True
+        best, main, homeless, sheltered = None, -1, True, False
         for door in doors or [MainDoor()]:
+            if sheltered and not door.sheltered:
+                break  # a porch without the door is no entrance, whatever the energy
             side, least = with_door(plain, door, targets)
             genome, counts, value = search_side(side, self.options.search, least, rng=self.rng)
             missing = door.piece >= 0 and not has_door(side, genome, counts)
             if best is None or (missing, value) < (homeless, best.energy):
                 best = Solution(genome, counts, widths(side, genome, counts), value, least)
                 main, homeless = -1 if missing else door.piece, missing
+            sheltered = sheltered or (door.sheltered and not missing)
             if value <= least + GOOD and not missing:
                 break
         assert best is not None

@@ -189,6 +189,18 @@ def test_walls_under_an_overhang_are_thinned(monkeypatch, inset, depth):
     assert back == pytest.approx([depth])
 
 
+def test_walls_below_a_closed_floor_keep_their_relief(monkeypatch):
+    """Under a cornice that covers the recess nothing overhangs, wherever the upper wall stands."""
+    monkeypatch.setattr("facade_tools.stylization.wings.COMPACT", 0.0)
+    sides = [textured_box((0, 0, 0), (8, 2, 9)), textured_box((12, 0, 0), (20, 2, 9))]
+    lid = textured_box((8, 0, 6), (12, 2, 9))
+    style = style_of(joined([textured_box((0, 2, 0), (20, 12, 9)), *sides, lid]), front=180.0)
+    assert len(style.blocks.blocks) == 1
+    low = placed_blocks(style.sheet, style.blocks, stacked(1.0))[0]
+    slab = placed_slabs(style.sheet, low)[0]
+    assert [y for y in slab.ys if 1e-6 < y < 6] == pytest.approx([2.0])
+
+
 def test_edges_snap_to_those_below(monkeypatch):
     """A recess of other proportions on the block above moves onto the one below."""
     monkeypatch.setattr("facade_tools.stylization.wings.COMPACT", 0.0)

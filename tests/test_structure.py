@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from facade_tools.stylization.snapping import snapped
+from facade_tools.stylization.snapping import snapped, unsqueezed
 from facade_tools.stylization.structure import Candidate, cuts, match_blocks, match_costs
 
 sizes = st.lists(st.tuples(*[st.floats(1, 50)] * 3), min_size=1, max_size=5).map(np.array)
@@ -61,3 +61,15 @@ def test_snapping_moves_to_neighbours_only():
     assert snapped(np.array([0.3, 4.8, 9.9]), np.array([0.0, 5.0, 10.0]), 10).tolist() == [0, 5, 10]
     assert snapped(np.array([0.0, 3.0, 9.9]), np.array([0.0, 10.0]), 10).tolist() == [0, 3, 10]
     assert snapped(np.array([1.0]), np.array([]), 10).tolist() == [1.0]
+
+
+def test_what_stands_between_snapped_edges_keeps_its_width():
+    """A window whose two edges would snap to one edge below, or far apart, stays as it was."""
+    window = np.array([3.0, 4.0, 8.0])
+    assert unsqueezed(window, np.array([3.4, 3.4, 8.3]), (0.0, 12.0)).tolist() == [3.0, 4.0, 8.3]
+    assert unsqueezed(window, np.array([2.0, 5.0, 8.0]), (0.0, 12.0)).tolist() == [3.0, 4.0, 8.0]
+    moved = np.array([3.1, 4.1, 8.2])
+    assert unsqueezed(window, moved, (0.0, 12.0)).tolist() == moved.tolist()
+    whole = np.array([2.2])  # in reach of κ, but its wall would lose more than a quarter
+    assert unsqueezed(np.array([3.0]), whole, (0.0, 12.0)).tolist() == [3.0]
+

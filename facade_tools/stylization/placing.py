@@ -17,7 +17,7 @@ from ..artifacts.blocks import Block, Blocks
 from ..artifacts.stylesheet import StyleBlock, StyleFace, StyleSheet
 from ..geometry.arrays import Floats
 from .remesh import Slab, on_grid, trimmed
-from .snapping import snapped
+from .snapping import snapped, unsqueezed
 from .storeys import Storey, cells, storeys
 from .structure import candidates, match_blocks
 
@@ -71,8 +71,8 @@ def placed_blocks(
     chosen: ids of the source blocks, if they are not those of least Ψ. flush: the plane of most
     wall stands on each side of a block, what stands before it at most LEDGE outside, and floors
     that would leave much of the block open fill it. From the ground up, walls under overhangs are
-    thinned and edges snapped to the blocks below (5.1.2, 5.2.1) unless the two source blocks stand
-    on each other like that themselves.
+    thinned and edges snapped to the blocks below as far as nothing between them is squeezed or
+    widened (5.1.2, 5.2.1), unless the two source blocks stand on each other like that themselves.
     """
     sources = {block.id: block for block in sheet.blocks}
     ids = matched_blocks(sheet, own, target) if chosen is None else chosen
@@ -252,22 +252,46 @@ def _relation(lower: Block, upper: Block, axis: int) -> tuple[float, float]:
 def _supported(sheet: StyleSheet, placed: list[Placed], pair: tuple[int, int]) -> None:
     """Thin the lower block's walls where the upper one would reach over them (Fig. 11)."""
     lower, upper = placed[pair[0]], placed[pair[1]]
+    reaching = _overhanging(sheet, lower, upper)
     maps = []
     for axis, sides in ((0, ("left", "right")), (1, ("front", "back"))):
         old, new = lower.maps[axis]
         size = float(old[-1])
         thickness = [_thickness(sheet, lower.source.id, side) for side in sides]
         ends = [_outer(sheet, upper, axis, side) for side in sides]
-        low = _thinned(lower, axis, thickness[0], ends[0])
-        high = _thinned(lower, axis, (size - thickness[1][0], size - thickness[1][1]), ends[1])
+        low = _thinned(lower, axis, thickness[0], ends[0]) if sides[0] in reaching else []
+        inside = (size - thickness[1][0], size - thickness[1][1])
+        high = _thinned(lower, axis, inside, ends[1]) if sides[1] in reaching else []
         knots = [*low, *high[::-1]]
         places = [place for place, _ in knots]
-        inner = all(a < b for a, b in pairwise(places))
-        if knots and inner and places[0] > 0 and places[-1] < size:
+        ordered = all(a < b for a, b in pairwise(places))
+        if knots and ordered and places[0] > 0 and places[-1] < size:
             old = np.array([old[0], *places, old[-1]])
             new = np.array([new[0], *(value for _, value in knots), new[-1]])
         maps.append((old, np.maximum.accumulate(new)))
     placed[pair[0]] = replace(lower, maps=(maps[0], maps[1]))
+
+
+def _overhanging(sheet: StyleSheet, lower: Placed, upper: Placed) -> set[str]:
+    """Return the sides on which an upper block stands over what the floor below it leaves open."""
+    below, above = placed_slabs(sheet, lower), placed_slabs(sheet, upper)
+    if not below or not above:
+        return set()
+    lines = (below[-1].xs, above[0].xs), (below[-1].ys, above[0].ys)
+    xs, ys = (
+        np.unique(np.clip(np.union1d(*pair), *sides))
+        for pair, sides in zip(lines, _sides(lower.target), strict=True)
+    )
+    filled, over = on_grid(below[-1], xs, ys), on_grid(above[0], xs, ys)
+    least = FLUSH * max(lower.target.width, lower.target.depth)
+    found = set()
+    for side, axis, step in (("left", 1, 1), ("right", 1, -1), ("front", 0, 1), ("back", 0, -1)):
+        # seen from the side, before the lower floor's wall
+        order = np.s_[::step, :] if axis == 0 else np.s_[:, ::step]
+        before = ~np.logical_or.accumulate(filled[order], axis=axis)[order]
+        if float(np.diff(ys) @ (over & before) @ np.diff(xs)) > least:
+            found.add(side)
+    return found
 
 
 def _thickness(sheet: StyleSheet, block: str, side: str) -> tuple[float, float]:
@@ -309,7 +333,8 @@ def _snapped(sheet: StyleSheet, lower: Placed, upper: Placed) -> Placed:
         start, end = float(new[0]), float(new[-1])
         goal = below[-1].xs if axis == 0 else below[-1].ys
         goal = goal[(goal > start + TOUCH) & (goal < end - TOUCH)]
-        moved = snapped(upper.moved(axis, places), goal, end - start)
+        stood = upper.moved(axis, places)
+        moved = unsqueezed(stood, snapped(stood, goal, end - start), (start, end))
         maps.append(
             (
                 np.concatenate([old[:1], places, old[-1:]]),

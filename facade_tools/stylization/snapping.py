@@ -7,6 +7,7 @@ import numpy as np
 from ..geometry.arrays import Floats, Integers
 
 SNAP_WINDOW = 0.2  # κ of 5.2.1, of the building's width
+UNSEEN = 0.1  # change of a width that the windows and ornaments between two vertices bear
 
 
 def snapped(upper: Floats, lower: Floats, width: float) -> Floats:
@@ -27,6 +28,23 @@ def snapped(upper: Floats, lower: Floats, width: float) -> Floats:
         if len(row):
             out[i] = lower[row[np.argmin(distance[i, row])]]
     return np.maximum.accumulate(out)
+
+
+def unsqueezed(before: Floats, after: Floats, ends: tuple[float, float]) -> Floats:
+    """Return vertices of which those are back that changed what stands between two of them.
+
+    before, after (n,): places of vertices, increasing, between the ends that stay. Beyond the
+    paper, whose faces may be squeezed to nothing: what lies between two vertices is a window or an
+    ornament that keeps its width, within UNSEEN.
+    """
+    widths = np.diff(before, prepend=ends[0], append=ends[1])
+    while True:
+        now = np.diff(after, prepend=ends[0], append=ends[1])
+        changed = np.abs(now - widths) > UNSEEN * widths + 1e-9
+        back = (changed[:-1] | changed[1:]) & (after != before)
+        if not back.any():
+            return after
+        after = np.where(back, before, after)
 
 
 def _warping(distance: Floats) -> Integers:

@@ -446,3 +446,27 @@ def test_shops_of_a_bottom_block_stand_once_however_high_it_grows(styles):
         if panel.block == index:
             done = split(panel.rules[1], panel.target[1])
             assert done.sources.count(2 * len(rule.insertable) - 1) == 1
+
+
+def test_doors_of_a_building_without_a_bottom_stay_on_the_ground():
+    """Three storeys of one wall: twice as high the lowest stands once, at the foot; above, never."""
+    style = style_of(BOX, front=180.0, bottom=0, top=0)
+    (own,) = style.blocks.blocks
+    count = len(_row_panels(style, style.blocks)[0].rules[1].insertable)
+    assert count > 1
+    twice = replace(style.blocks, blocks=(replace(own, height=2 * own.height),))
+    half = replace(style.blocks, blocks=(replace(own, height=0.5 * own.height),))
+    for blocks in (twice, half):
+        for panel in _row_panels(style, blocks):
+            sources = split(panel.rules[1], panel.target[1]).sources
+            assert sources.count(2 * count - 1) == 1
+            assert sources[-2:] == (2 * count - 1, 2 * count)
+    hung = replace(own, id="hung", z=own.height, height=0.5 * own.height)
+    above = replace(style.blocks, blocks=(own, hung))
+    assert all(not p.rules[1].once for p in _row_panels(style, above) if p.block == 1)
+
+
+def _row_panels(style, blocks):
+    placed = placed_blocks(style.sheet, style.blocks, blocks)
+    slabs = [placed_slabs(style.sheet, item) for item in placed]
+    return panels(style.sheet, placed, slabs, None, {style.blocks.blocks[0].id})

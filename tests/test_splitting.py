@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -196,3 +197,33 @@ def test_a_sill_stays_with_its_window():
     edges = np.flatnonzero(np.diff(sill))
     assert len(edges) == 2
     assert edges[1] - edges[0] == pytest.approx(15, abs=2)
+
+
+# cornice, an attic, two storeys, a high ground floor, plinth
+ROWS = SplitRule((1.5, 1.2, 1.0, 1.4, 0.3), (1.0, 1.6, 1.6, 2.6), ends=True)
+
+
+@pytest.mark.parametrize("size", [13.0, 15.0, 18.0, 25.0, 60.0])
+@pytest.mark.parametrize("once", [(), (3,)])
+def test_cornice_and_ground_floor_stand_at_the_ends_of_a_higher_face(size, once):
+    done = split(replace(ROWS, once=once), size)
+    assert sum(done.sizes) == pytest.approx(size)
+    for end in (0, 1, 7, 8):
+        assert done.sources.count(end) == 1
+    assert (done.sources[:2], done.sources[-2:]) == ((0, 1), (7, 8))
+    inner = [source for source in done.sources if source % 2][1:-1]
+    assert set(inner) == {3, 5}
+    for source, height in zip(done.sources, done.sizes, strict=True):
+        assert source % 2 == 0 or height == pytest.approx(ROWS.insertable[source // 2])
+
+
+def test_a_lower_face_keeps_its_ground_floor_where_it_stands_on_the_ground():
+    low = split(replace(ROWS, once=(3,)), 8.0)
+    assert low.sources[-2:] == (7, 8) and 1 < low.windows < 4
+    assert 7 not in split(ROWS, 8.0).sources
+
+
+def test_a_row_without_its_like_keeps_what_stands_once_when_it_becomes_narrower():
+    row = SplitRule((1.0,) * 6, (2.0,) * 5, (2,))
+    for size in (13.0, 10.0, 7.0):
+        assert split(row, size).sources.count(5) == 1

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -46,10 +46,12 @@ def panels(
     placed: Sequence[Placed],
     slabs: Sequence[list[Slab]],
     aligned: Mapping[str, SplitRule] | None = None,
+    grounded: Collection[str] = (),
 ) -> list[Panel]:
     """Return the visible faces of placed blocks; slabs: the plans of each block's storeys.
 
-    aligned: rules of groups that stand in for the sheet's own.
+    aligned: rules of groups that stand in for the sheet's own. grounded: ids of the source blocks
+    that stand on the ground.
     """
     rules = {rule.id: SplitRule(rule.a, rule.b) for rule in sheet.rules}
     of_group = {group.id: rules[group.rule] for group in sheet.groups} | dict(aligned or {})
@@ -58,13 +60,15 @@ def panels(
         for face in wall.faces:
             walls.setdefault((wall.block, face.floor), []).append((wall.side, face))
     found = []
+    ground = min((item.target.z for item in placed), default=0.0)
     for index, item in enumerate(placed):
+        stands = item.source.id in grounded and item.target.z < ground + TOUCH
         others = [slab for k, own in enumerate(slabs) if k != index for slab in own]
         for storey in item.storeys:
             members = walls.get((item.source.id, storey.floor), [])
             for side, face in _widest(members) if storey.boxed else members:
                 corners = face_corners(item, storey, face, side)
-                rows = _rows(of_group[face.horizontal], face, item.source)
+                rows = _rows(of_group[face.horizontal], face, item.source, stands)
                 used = (of_group[face.vertical], rows)
                 panel = _panel(index, side, corners, face, used)
                 if panel is not None and len(seen := _seen(panel, others)):
@@ -72,18 +76,18 @@ def panels(
     return found
 
 
-def _rows(rule: SplitRule, face: StyleFace, block: StyleBlock) -> SplitRule:
+def _rows(rule: SplitRule, face: StyleFace, block: StyleBlock, stands: bool) -> SplitRule:
     """Return the rule by which a face is split into rows.
 
     A slab that is a fragment of a storey has no storeys to repeat; on the ground the lowest row,
-    of shops and doors, stands once.
+    of shops and doors, stands once, and so do cornice and plinth of every face. stands: is the
+    block on the ground, here and in the source?
     """
-    height = face.top - face.bottom
+    height, count = face.top - face.bottom, len(rule.insertable)
     if height < LEAST_STOREY and height < FRAGMENT * block.size[2]:
         return SplitRule((rule.size,))
-    if block.role == "bottom" and face.bottom < STEP:
-        return replace(rule, once=tuple(range(len(rule.insertable))[-1:]))
-    return rule
+    lowest = face.bottom < STEP and (block.role == "bottom" or (stands and count > 1))
+    return replace(rule, once=(count - 1,) if lowest and count else (), ends=True)
 
 
 def _widest(members: Sequence[tuple[str, StyleFace]]) -> list[tuple[str, StyleFace]]:

@@ -24,7 +24,7 @@ from .structure import candidates, match_blocks
 TOUCH = 1e-6  # m
 SUPPORT = 0.9  # of the distance of the outer boundaries: thickness of a wall under an overhang
 FLUSH = 0.05  # m: walls nearer than that stand in one plane, and thinning would take all relief
-OUTER = 0.25  # of a block, in which the plane of most wall is looked for
+OUTER = 0.25  # of a block, in which its walls stand
 FULL = 0.9  # of a block's plan, that a floor under a roof made for the block must fill
 LINTEL = 0.2  # m: over niches right under a roof
 LEDGE = 0.25  # m: cornices and bases stand at most so far before a wall that is flush
@@ -310,7 +310,12 @@ def _outer(sheet: StyleSheet, upper: Placed, axis: int, side: str) -> float:
 def _thinned(
     lower: Placed, axis: int, bounds: tuple[float, float], reach: float
 ) -> list[tuple[float, float]]:
-    """Return knots of a wall's inner boundary where the upper wall lies within its thickness."""
+    """Return knots of a wall's inner boundary where the upper wall lies within its thickness.
+
+    What is deeper than the outer quarter of the block is a court or a wing, no wall.
+    """
+    if abs(bounds[1] - bounds[0]) > OUTER * float(lower.maps[axis][0][-1]):
+        return []
     outer, inner = lower.moved(axis, np.array(bounds)).tolist()
     distance = reach - outer if bounds[1] > bounds[0] else outer - reach
     thickness = abs(inner - outer)

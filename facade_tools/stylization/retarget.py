@@ -18,7 +18,7 @@ from .atlas import LARGEST_PAGE, PADDING, Atlas, encoded_page, painted, planned
 from .bays import with_bays
 from .columns import aligned_rules
 from .hull import layers, mass, roofs
-from .panels import SMALL, Panel, panels, reassigned
+from .panels import SMALL, STEP, Panel, panels, reassigned
 from .placing import Placed, foreign_blocks, matched_blocks, placed_blocks, placed_slabs
 from .projection import SIDES
 from .remesh import Slab
@@ -45,7 +45,7 @@ def retarget(style: Style, target: Blocks, small: float = SMALL, *, flush: bool 
     style, chosen = with_bays(style, chosen, target, aligned)
     placed = placed_blocks(style.sheet, style.blocks, target, chosen, flush=flush)
     slabs = [placed_slabs(style.sheet, item) for item in placed]
-    found = panels(style.sheet, placed, slabs, aligned)
+    found = panels(style.sheet, placed, slabs, aligned, _grounded(style.blocks))
     found = reassigned(found, foreign_blocks(style.blocks, placed), small)
     meshes, materials = _textured(style, placed, found)
     stack = layers([slab for own in slabs for slab in own])
@@ -57,6 +57,12 @@ def retarget(style: Style, target: Blocks, small: float = SMALL, *, flush: bool 
     }
     whole = [framed(mesh, target.frame) for mesh in [body, *meshes, *tops] if len(mesh.faces)]
     return Scene(target.id, tuple(whole), materials)
+
+
+def _grounded(own: Blocks) -> set[str]:
+    """Return the ids of the blocks that stand on the ground."""
+    ground = min(block.z for block in own.blocks)
+    return {block.id for block in own.blocks if block.z < ground + STEP}
 
 
 def _mean_colour(style: Style, found: Sequence[Panel]) -> str:

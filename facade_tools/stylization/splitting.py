@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -29,12 +30,14 @@ MARGINS = 0.5, 3.0  # least and most of their width that margins take
 class SplitRule:
     """Widths in metres: scalable a_1 … a_{m+1} around insertable b_1 … b_m (eq. 8).
 
-    once: the numbers of insertable sections that are not repeated, from 0.
+    once: the numbers of insertable sections that are not repeated, from 0. ends: the outermost
+    walls (cornice and plinth) stand at the ends of a face only, not between repeats.
     """
 
     scalable: tuple[float, ...]
     insertable: tuple[float, ...] = ()
     once: tuple[int, ...] = ()
+    ends: bool = False
 
     @property
     def size(self) -> float:
@@ -159,44 +162,90 @@ def split(rule: SplitRule, size: float, patience: tuple[float, float] = MARGINS)
     most = packed(rule, size)
     chosen = _repeated(rule, size, most)
     crowded = not chosen.windows or not CROWDED <= chosen.stretch <= 1 / CROWDED
-    if rule.once and size > rule.size and (most > len(rule.insertable) or crowded):
+    m = len(rule.insertable)
+    if size > rule.size and (_heaped(rule) or (rule.once and (most > m or crowded))):
         return _with_single(rule, size, patience)
     if not crowded:
-        regular = _regular(rule, size, most)
+        regular = _row(rule, size, most)
         return _spread(rule, regular if regular.stretch > LEAST_WALLS else chosen, patience)
-    options = [_spread(rule, _regular(rule, size, n), patience) for n in range(most + 1, 0, -1)]
+    options = [_spread(rule, _row(rule, size, n), patience) for n in range(most + 1, 0, -1)]
     if rule.once:
-        options = [option for option in options if option.windows <= len(rule.insertable)]
+        options = [option for option in options if option.windows <= m]
     best = min((o for o in options if o.stretch > TIGHT), key=partial(_change, rule), default=None)
     return _plain(rule, size) if best is None or _bare(rule, size, best) else best
 
 
+def _heaped(rule: SplitRule) -> bool:
+    """Tell whether whole repeats would put a cornice or a ground floor into the middle of a face."""
+    return rule.ends and bool(rule.once or not repeat(rule))
+
+
+def _row(rule: SplitRule, size: float, windows: int) -> Split:
+    """Return a face with so many windows, those that stand once among them."""
+    single, m = len(rule.once), len(rule.insertable)
+    if windows == m:
+        return _repeated(rule, size, windows)
+    if _heaped(rule):
+        return _sequence(rule, size, _rows(rule, windows))
+    if 0 < single < m and single <= windows:
+        places = {_place(k, m, windows): k for k in rule.once}
+        if len(places) == single:  # in a short row two of them may meet
+            return _sequence(rule, size, _inserted(rule, places, windows))
+    return _regular(rule, size, windows)
+
+
 def _with_single(rule: SplitRule, size: float, patience: tuple[float, float]) -> Split:
-    """Return a face wider than its rule (m), some of whose windows stand once."""
+    """Return a face larger than its rule (m), parts of which stand once: windows or its ends."""
     m = len(rule.insertable)
     usual = [b for k, b in enumerate(rule.insertable) if k not in rule.once]
     single = math.fsum(rule.insertable[k] for k in rule.once)
     # what frames a single ornament is none of the row's windows
-    most = m + math.ceil((size - rule.size) / min(usual)) if math.fsum(usual) >= single else m
-    options = (_spread(rule, _inserted(rule, size, n), patience) for n in range(m, most + 1))
+    grows = usual and (rule.ends or math.fsum(usual) >= single)
+    more = len(usual) * (size - rule.size) / math.fsum(usual) if grows else 0.0
+    options = (_spread(rule, _row(rule, size, m + n), patience) for n in range(math.ceil(more) + 1))
     return min((o for o in options if o.stretch > TIGHT), key=partial(_change, rule))
 
 
-def _inserted(rule: SplitRule, size: float, windows: int) -> Split:
-    """Return a face with at least the rule's windows: those that stand once keep their place.
+def _inserted(rule: SplitRule, places: Mapping[int, int], windows: int) -> list[int]:
+    """Return the windows of a row: those that stand once at their places, the others in order."""
+    rest = itertools.cycle(k for k in range(len(rule.insertable)) if k not in rule.once)
+    return [places[i] if i in places else next(rest) for i in range(windows)]
 
-    The others follow each other in their order, again and again.
+
+def _rows(rule: SplitRule, windows: int) -> list[int]:
+    """Return the rows of a face from the top, whose first and last row stay at its ends.
+
+    Where it grows, the rows above the lowest one follow once more (and again), so that all leads
+    to the ground as in the source; where it shrinks on the ground, the rows above that go.
     """
     m = len(rule.insertable)
-    usual = [k for k in range(m) if k not in rule.once]
-    places = {math.floor((k + 0.5) / m * windows): k for k in rule.once}
-    rest = itertools.cycle(usual)
-    order = [places[i] if i in places else next(rest) for i in range(windows)]
-    walls = [0, *(2 * _between(rule, a, b) for a, b in itertools.pairwise(order)), 2 * m]
+    if windows < m:
+        return [*range(windows - 1), m - 1 if rule.once else windows - 1]
+    middle = range(1, m - 1) or range(1)
+    again = [middle[-1 - i % len(middle)] for i in range(windows - m)]
+    return [*range(m - 1), *again[::-1], m - 1]
+
+
+def _sequence(rule: SplitRule, size: float, order: Sequence[int]) -> Split:
+    """Return a face with windows in any order, the outermost walls of the rule at its ends."""
+    between = _above if rule.ends else _between
+    walls = [0, *(2 * between(rule, a, b) for a, b in itertools.pairwise(order))]
     sections = itertools.chain.from_iterable(
-        (wall, 2 * k + 1) for wall, k in zip(walls, order, strict=False)
+        (wall, 2 * k + 1) for wall, k in zip(walls, order, strict=True)
     )
-    return _arranged(rule, size, (*sections, walls[-1]))
+    return _arranged(rule, size, (*sections, 2 * len(rule.insertable)))
+
+
+def _above(rule: SplitRule, first: int, second: int) -> int:
+    """Return the wall between two rows: the one above the second, as in the source."""
+    return max(second, 1)
+
+
+def _place(window: int, count: int, windows: int) -> int:
+    """Return the place, from 0, of a window out of count in a row of another length."""
+    if count == 1:
+        return windows // 2
+    return math.floor(window / (count - 1) * (windows - 1) + 0.5)
 
 
 def _between(rule: SplitRule, first: int, second: int) -> int:

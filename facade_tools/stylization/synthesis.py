@@ -35,6 +35,7 @@ def resized_rule(rule: SplitRule, size: float) -> SplitRule:
         tuple(factor * a for a in rule.scalable),
         tuple(factor * b for b in rule.insertable),
         rule.once,
+        rule.ends,
     )
 
 

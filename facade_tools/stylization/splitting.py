@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -182,15 +182,14 @@ def _heaped(rule: SplitRule) -> bool:
 
 def _row(rule: SplitRule, size: float, windows: int) -> Split:
     """Return a face with so many windows, those that stand once among them."""
-    single, m = len(rule.once), len(rule.insertable)
+    m = len(rule.insertable)
     if windows == m:
         return _repeated(rule, size, windows)
-    if _heaped(rule):
-        return _sequence(rule, size, _rows(rule, windows))
-    if 0 < single < m and single <= windows:
-        places = {_place(k, m, windows): k for k in rule.once}
-        if len(places) == single:  # in a short row two of them may meet
-            return _sequence(rule, size, _inserted(rule, places, windows))
+    fixed, heaped = set(rule.once), _heaped(rule)
+    if heaped and windows > m > 1:
+        fixed |= {0, m - 1} if m > 2 else {1}
+    if (fixed or heaped) and fixed < set(range(m)) and len(fixed) <= windows:
+        return _sequence(rule, size, _order(m, fixed, windows))
     return _regular(rule, size, windows)
 
 
@@ -206,54 +205,39 @@ def _with_single(rule: SplitRule, size: float, patience: tuple[float, float]) ->
     return min((o for o in options if o.stretch > TIGHT), key=partial(_change, rule))
 
 
-def _inserted(rule: SplitRule, places: Mapping[int, int], windows: int) -> list[int]:
-    """Return the windows of a row: those that stand once at their places, the others in order."""
-    rest = itertools.cycle(k for k in range(len(rule.insertable)) if k not in rule.once)
-    return [places[i] if i in places else next(rest) for i in range(windows)]
+def _order(count: int, fixed: Collection[int], windows: int) -> list[int]:
+    """Return the windows of a row: those of the rule in their order, but more of them, or fewer.
 
-
-def _rows(rule: SplitRule, windows: int) -> list[int]:
-    """Return the rows of a face from the top, whose first and last row stay at its ends.
-
-    Where it grows, the rows above the lowest one follow once more (and again), so that all leads
-    to the ground as in the source; where it shrinks on the ground, the rows above that go.
+    count: windows of the rule. fixed: those that are shown once. Runs of the others grow or shrink
+    in proportion; what is inserted repeats the end of a run, which then leads on as in the source.
     """
-    m = len(rule.insertable)
-    if windows < m:
-        return [*range(windows - 1), m - 1 if rule.once else windows - 1]
-    middle = range(1, m - 1) or range(1)
-    again = [middle[-1 - i % len(middle)] for i in range(windows - m)]
-    return [*range(m - 1), *again[::-1], m - 1]
+    runs: list[list[int]] = [[]]
+    for k in range(count):
+        if k in fixed:
+            runs.append([])
+        else:
+            runs[-1].append(k)
+    share = (windows - len(fixed)) / (count - len(fixed))
+    ends = [0, *(math.floor(n * share + 0.5) for n in itertools.accumulate(map(len, runs)))]
+    order: list[int] = []
+    for run, single, (a, b) in zip(
+        runs, [*sorted(fixed), None], itertools.pairwise(ends), strict=True
+    ):
+        again = [run[-1 - i % len(run)] for i in range(b - a - len(run))]
+        order += [*run[: b - a], *again[::-1], *([] if single is None else [single])]
+    return order
 
 
 def _sequence(rule: SplitRule, size: float, order: Sequence[int]) -> Split:
-    """Return a face with windows in any order, the outermost walls of the rule at its ends."""
-    between = _above if rule.ends else _between
-    walls = [0, *(2 * between(rule, a, b) for a, b in itertools.pairwise(order))]
+    """Return a face with windows in any order, the outermost walls of the rule at its ends.
+
+    Every window is shown with the wall before it; no other wall than an inner one stands inside.
+    """
+    walls = [0, *(2 * max(k, 1) for k in order[1:])]
     sections = itertools.chain.from_iterable(
         (wall, 2 * k + 1) for wall, k in zip(walls, order, strict=True)
     )
     return _arranged(rule, size, (*sections, 2 * len(rule.insertable)))
-
-
-def _above(rule: SplitRule, first: int, second: int) -> int:
-    """Return the wall between two rows: the one above the second, as in the source."""
-    return max(second, 1)
-
-
-def _place(window: int, count: int, windows: int) -> int:
-    """Return the place, from 0, of a window out of count in a row of another length."""
-    if count == 1:
-        return windows // 2
-    return math.floor(window / (count - 1) * (windows - 1) + 0.5)
-
-
-def _between(rule: SplitRule, first: int, second: int) -> int:
-    """Return the wall between two windows that need not be neighbours in the rule."""
-    last = len(rule.insertable) - 1
-    if (second in rule.once and second > 0) or first == last:
-        return max(second, 1)
-    return first + 1
 
 
 def _bare(rule: SplitRule, size: float, best: Split) -> bool:

@@ -28,6 +28,7 @@ from facade_tools.stylization.panels import panels, reassigned
 from facade_tools.stylization.placing import (
     foreign_blocks,
     matched_blocks,
+    outset_blocks,
     placed_blocks,
     placed_slabs,
 )
@@ -464,6 +465,26 @@ def test_doors_of_a_building_without_a_bottom_stay_on_the_ground():
     hung = replace(own, id="hung", z=own.height, height=0.5 * own.height)
     above = replace(style.blocks, blocks=(own, hung))
     assert all(not p.rules[1].once for p in _row_panels(style, above) if p.block == 1)
+
+
+@pytest.mark.parametrize("width", [14.0, 20.0, 33.0])
+def test_niches_keep_their_width_where_walls_stand_flush_with_roofs(width):
+    """The plinth stands before the walls; that walls go to the block's sides widens no niche."""
+    piers = [textured_box((a, 0, 1.5), (b, 0.4, 9)) for a, b in ((0, 4), (7, 13), (16, 20))]
+    plinth = textured_box((-0.1, -0.1, 0), (20.1, 12.1, 1.5))
+    body = [plinth, textured_box((0, 0.4, 1.5), (20, 12, 9))]
+    style = style_of(joined([*body, *piers]), front=180.0, bottom=0, top=0)
+    assert len(style.blocks.blocks) == 1
+    target = Blocks("one", (Block("one", "body", 0, 0, 0, width, 12, 9, 3),))
+    chosen = matched_blocks(style.sheet, style.blocks, target)
+    sized = outset_blocks(style.sheet, target, chosen)
+    style, chosen = with_bays(style, chosen, sized, {})
+    (placed,) = placed_blocks(style.sheet, style.blocks, target, chosen, flush=True)
+    slab = placed_slabs(style.sheet, placed)[-2]  # below the lintel
+    front = slab.cells[0]
+    niches = np.diff(slab.xs)[~front]
+    assert len(niches) >= 1 and niches == pytest.approx([3.0] * len(niches), abs=0.02)
+    assert (slab.xs[0], slab.xs[-1]) == pytest.approx((0.0, width), abs=0.01)
 
 
 def _row_panels(style, blocks):

@@ -45,6 +45,13 @@ def test_a_model_matches_itself_and_roles_are_respected():
     assert match_blocks(blocks[1:2], blocks) == [0, 0, 0]
 
 
+def test_a_storey_takes_no_moulding():
+    """A garage as wide and flat as the source's cornice is not made of it, but its like is."""
+    source = [block("body", 8, 6, 9), block("body", 8, 6, 0.5)]
+    assert match_blocks(source, [block("body", 20, 16, 2.5), block("body", 8, 6, 0.6)]) == [0, 1]
+    assert match_blocks(source[1:], [block("body", 20, 16, 2.5)]) == [0]
+
+
 def test_of_equal_blocks_the_one_that_lies_alike_is_taken():
     twins = [block("body", 5, 9, 6, place=(x, 0.5, 0.5)) for x in (0.1, 0.9)]
     assert match_blocks(twins, twins[::-1]) == [1, 0]

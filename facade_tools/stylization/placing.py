@@ -58,6 +58,19 @@ def matched_blocks(sheet: StyleSheet, own: Blocks, target: Blocks) -> list[str]:
     return [known[index].id for index in chosen]
 
 
+def outset_blocks(sheet: StyleSheet, target: Blocks, chosen: Sequence[str]) -> Blocks:
+    """Return the target's blocks as wide and deep as sources whose walls stand flush with them.
+
+    chosen: ids of the source blocks. What stands before the plane of most wall comes on top.
+    """
+    sources = {block.id: block for block in sheet.blocks}
+    blocks = []
+    for block, name in zip(target.blocks, chosen, strict=True):
+        x, y = (sum(_planes(sheet, sources[name], axis)) for axis in (0, 1))
+        blocks.append(replace(block, width=block.width + x, depth=block.depth + y))
+    return replace(target, blocks=tuple(blocks))
+
+
 def placed_blocks(
     sheet: StyleSheet,
     own: Blocks,
@@ -158,9 +171,9 @@ def _stretched(sheet: StyleSheet, source: StyleBlock, block: Block) -> Placed:
 def _flush(sheet: StyleSheet, placed: Placed) -> Placed:
     """Bring the planes of most wall to the sides of the target's block."""
     maps = []
-    for axis, sides in ((0, ("left", "right")), (1, ("front", "back"))):
+    for axis in (0, 1):
         size = placed.source.size[axis]
-        low, high = (_main_plane(sheet, placed.source.id, side, size) for side in sides)
+        low, high = _planes(sheet, placed.source, axis)
         new = placed.maps[axis][1]
         start, end = float(new[0]), float(new[-1])
         knots = [(low, start), (size - high, end)]
@@ -191,6 +204,13 @@ def _closed(placed: Placed) -> Placed:
     if last.boxed or last.top - last.bottom < 2 * LINTEL:
         return placed
     return replace(placed, storeys=(*rest, replace(last, lintel=LINTEL)))
+
+
+def _planes(sheet: StyleSheet, source: StyleBlock, axis: int) -> tuple[float, float]:
+    """Return how far inside a block's two sides across an axis most of their wall stands (m)."""
+    low, high = (("left", "right"), ("front", "back"))[axis]
+    size = source.size[axis]
+    return _main_plane(sheet, source.id, low, size), _main_plane(sheet, source.id, high, size)
 
 
 def _main_plane(sheet: StyleSheet, block: str, side: str, size: float) -> float:

@@ -19,7 +19,14 @@ from .bays import with_bays
 from .columns import aligned_rules
 from .hull import layers, mass, roofs
 from .panels import SMALL, STEP, Panel, panels, reassigned
-from .placing import Placed, foreign_blocks, matched_blocks, placed_blocks, placed_slabs
+from .placing import (
+    Placed,
+    foreign_blocks,
+    matched_blocks,
+    outset_blocks,
+    placed_blocks,
+    placed_slabs,
+)
 from .projection import SIDES
 from .remesh import Slab
 from .style import Style
@@ -42,7 +49,8 @@ def retarget(style: Style, target: Blocks, small: float = SMALL, *, flush: bool 
     """
     chosen = matched_blocks(style.sheet, style.blocks, target)
     aligned = aligned_rules(style.sheet, style.blocks, style.pictures)
-    style, chosen = with_bays(style, chosen, target, aligned)
+    sized = outset_blocks(style.sheet, target, chosen) if flush else target
+    style, chosen = with_bays(style, chosen, sized, aligned)
     placed = placed_blocks(style.sheet, style.blocks, target, chosen, flush=flush)
     slabs = [placed_slabs(style.sheet, item) for item in placed]
     found = panels(style.sheet, placed, slabs, aligned, _grounded(style.blocks))

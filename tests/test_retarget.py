@@ -491,3 +491,13 @@ def _row_panels(style, blocks):
     placed = placed_blocks(style.sheet, style.blocks, blocks)
     slabs = [placed_slabs(style.sheet, item) for item in placed]
     return panels(style.sheet, placed, slabs, None, {style.blocks.blocks[0].id})
+
+
+@pytest.mark.parametrize("flush", [False, True])
+def test_niches_of_a_deeper_building_are_as_deep_as_in_the_source(monkeypatch, flush):
+    monkeypatch.setattr("facade_tools.stylization.wings.COMPACT", 0.0)
+    style = style_of(recessed(), front=180.0)
+    deep = Blocks("deep", (Block("deep", "body", 0, 0, 0, 20, 30, 9, 3),))
+    (placed,) = placed_blocks(style.sheet, style.blocks, deep, flush=flush)
+    slab = placed_slabs(style.sheet, placed)[0]
+    assert [y for y in slab.ys if 1e-6 < y < 29] == pytest.approx([2.0])

@@ -158,14 +158,31 @@ def _without_nothing(slab: Slab) -> Slab:
 
 
 def _stretched(sheet: StyleSheet, source: StyleBlock, block: Block) -> Placed:
-    maps = tuple(
-        (np.array([0.0, size]), np.array([low, low + length]))
-        for size, low, length in (
-            (source.size[0], block.x, block.width),
-            (source.size[1], block.y, block.depth),
-        )
+    maps = (
+        _kept_relief(sheet, source, 0, block.x, block.width),
+        _kept_relief(sheet, source, 1, block.y, block.depth),
     )
-    return Placed(block, source, storeys(sheet, source, block), (maps[0], maps[1]))
+    return Placed(block, source, storeys(sheet, source, block), maps)
+
+
+def _kept_relief(
+    sheet: StyleSheet, source: StyleBlock, axis: int, low: float, length: float
+) -> Knots:
+    """Return the map from a source block to a stretch of an axis that it may have to fill.
+
+    Where it grows, what stands before and behind its walls is as deep as in the source. What is
+    deeper than the outer quarter of the block is a court or a wing, no wall.
+    """
+    size = source.size[axis]
+    outer, inner = (
+        _thickness(sheet, source.id, side)[1] for side in (("left", "right"), ("front", "back"))[axis]
+    )
+    knots = [(0.0, low)]
+    if length > size:
+        knots += [(outer, low + outer)] * (TOUCH < outer <= OUTER * size)
+        knots += [(size - inner, low + length - inner)] * (TOUCH < inner <= OUTER * size)
+    knots.append((size, low + length))
+    return np.array([old for old, _ in knots]), np.array([new for _, new in knots])
 
 
 def _flush(sheet: StyleSheet, placed: Placed) -> Placed:
@@ -174,9 +191,11 @@ def _flush(sheet: StyleSheet, placed: Placed) -> Placed:
     for axis in (0, 1):
         size = placed.source.size[axis]
         low, high = _planes(sheet, placed.source, axis)
-        new = placed.maps[axis][1]
+        old, new = placed.maps[axis]
         start, end = float(new[0]), float(new[-1])
-        knots = [(low, start), (size - high, end)]
+        relief = [k for k in old[1:-1].tolist() if low + TOUCH < k < size - high - TOUCH]
+        kept = [(k, start + k - low if k < size / 2 else end - size + high + k) for k in relief]
+        knots = [(low, start), *kept, (size - high, end)]
         knots = [(0.0, start - min(low, LEDGE))] * (low > TOUCH) + knots
         knots += [(size, end + min(high, LEDGE))] * (high > TOUCH)
         maps.append((np.array([k for k, _ in knots]), np.array([v for _, v in knots])))

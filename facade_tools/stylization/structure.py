@@ -11,7 +11,7 @@ import numpy as np
 from ..artifacts.blocks import Block, BlockRole
 from ..artifacts.stylesheet import StyleBlock
 from ..geometry.arrays import Floats
-from .storeys import LEAST_STOREY, SMALL_STOREY
+from .storeys import LEAST_STOREY
 
 LEAST_CHANGE = 1.05  # of floor area, for a cut (CONTRACT)
 
@@ -60,13 +60,12 @@ def match_blocks(sources: Sequence[Candidate], targets: Sequence[Candidate]) -> 
     body as high as a storey takes no moulding (a lower block) where the source has others. Of
     blocks with equal costs the one that lies most alike in its building is taken.
     """
-    storey = min(LEAST_STOREY, SMALL_STOREY * max(source.size[2] for source in sources))
     costs = match_costs(*(np.array([c.size for c in side]) for side in (sources, targets)))
     chosen = []
     for j, target in enumerate(targets):
         same = [i for i, source in enumerate(sources) if source.role == target.role]
-        if target.role == "body" and target.size[2] >= storey:
-            same = [i for i in same if sources[i].size[2] >= storey] or same
+        if target.role == "body" and target.size[2] >= LEAST_STOREY:
+            same = [i for i in same if sources[i].size[2] >= LEAST_STOREY] or same
         candidates = same or list(range(len(sources)))
         least = min(costs[i, j] for i in candidates)
         equal = [i for i in candidates if costs[i, j] <= least * (1 + 1e-9)]

@@ -219,7 +219,8 @@ def test_cornice_and_ground_floor_stand_at_the_ends_of_a_higher_face(size, once)
 
 def test_a_lower_face_keeps_its_ground_floor_where_it_stands_on_the_ground():
     low = split(replace(ROWS, once=(3,)), 8.0)
-    assert low.sources[-2:] == (7, 8) and 1 < low.windows < 4
+    assert low.sources[-2:] == (7, 8)
+    assert 1 < low.windows < 4
     assert 7 not in split(ROWS, 8.0).sources
 
 

@@ -79,4 +79,3 @@ def test_what_stands_between_snapped_edges_keeps_its_width():
     assert unsqueezed(window, moved, (0.0, 12.0)).tolist() == moved.tolist()
     whole = np.array([2.2])  # in reach of κ, but its wall would lose more than a quarter
     assert unsqueezed(np.array([3.0]), whole, (0.0, 12.0)).tolist() == [3.0]
-

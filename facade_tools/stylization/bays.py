@@ -6,7 +6,7 @@ colours of its picture: where walls stand before or behind their usual plane is 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -178,23 +178,12 @@ def _with_bays(
     pictures = dict(style.pictures)
     floors = [replace(_floor(sheet.floors[i], axis, found), block=new) for i in numbers]
     number = {old: len(sheet.floors) + k for k, old in enumerate(numbers)}
-    ends = (bays.low, size - bays.high)
+    cut = _Cut(bays, found, signs, target, pictures)
     walls = []
-    for wall in sheet.walls:
-        if wall.block == name:
-            along = SIDES[wall.side][0] == axis
-            faces = []
-            for face in wall.faces:
-                sign = signs.get(face.vertical) if along else None
-                board = _board(face, sign, bays, found, pictures) if sign is not None else None
-                if board is not None:
-                    parts: Iterable[StyleFace] = [board]
-                elif along:
-                    parts = _along(face, found, pictures)
-                else:
-                    parts = _across(face, found, ends, target)
-                faces += [replace(part, floor=number[face.floor]) for part in parts]
-            walls.append(replace(wall, block=new, faces=tuple(faces)))
+    for wall in (wall for wall in sheet.walls if wall.block == name):
+        parts = cut.along if SIDES[wall.side][0] == axis else cut.across
+        faces = [replace(f, floor=number[f.floor]) for face in wall.faces for f in parts(face)]
+        walls.append(replace(wall, block=new, faces=tuple(faces)))
     sizes = tuple(target if k == axis else v for k, v in enumerate(block.size))
     sheet = replace(
         sheet,
@@ -285,6 +274,34 @@ def _turned(rows: Sequence[str]) -> list[str]:
 def _moved(piece: Piece, place: float) -> float:
     (a, b), (c, d) = piece.old, piece.new
     return c + (place - a) / (b - a) * (d - c)
+
+
+@dataclass(frozen=True)
+class _Cut:
+    """How the faces of a block are cut into the pieces of another size (target, m).
+
+    signs: rules of the groups that are one sign. pictures: of the style, to which parts are added.
+    """
+
+    bays: Bays
+    found: Sequence[Piece]
+    signs: Mapping[str, SplitRule]
+    target: float
+    pictures: dict[str, Picture]
+
+    def along(self, face: StyleFace) -> Iterator[StyleFace]:
+        """Yield what of a face each piece shows; a sign across all of them is not cut."""
+        sign = self.signs.get(face.vertical)
+        board = _board(face, sign, self.bays, self.found, self.pictures) if sign else None
+        if board is None:
+            yield from _along(face, self.found, self.pictures)
+        else:
+            yield board
+
+    def across(self, face: StyleFace) -> Iterator[StyleFace]:
+        """Yield a face across the axis in every piece that it stands in."""
+        ends = self.bays.low, self.bays.low + self.bays.rule.size
+        return _across(face, self.found, ends, self.target)
 
 
 def _along(

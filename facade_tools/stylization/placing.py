@@ -28,6 +28,7 @@ OUTER = 0.25  # of a block, in which its walls stand
 FULL = 0.9  # of a block's plan, that a floor under a roof made for the block must fill
 LINTEL = 0.2  # m: over niches right under a roof
 LEDGE = 0.25  # m: cornices and bases stand at most so far before a wall that is flush
+ACROSS = (("left", "right"), ("front", "back"))  # the sides where the axes x and y begin and end
 Knots = tuple[Floats, Floats]
 
 
@@ -174,13 +175,11 @@ def _kept_relief(
     deeper than the outer quarter of the block is a court or a wing, no wall.
     """
     size = source.size[axis]
-    outer, inner = (
-        _thickness(sheet, source.id, side)[1] for side in (("left", "right"), ("front", "back"))[axis]
-    )
+    first, second = (_thickness(sheet, source.id, side)[1] for side in ACROSS[axis])
     knots = [(0.0, low)]
     if length > size:
-        knots += [(outer, low + outer)] * (TOUCH < outer <= OUTER * size)
-        knots += [(size - inner, low + length - inner)] * (TOUCH < inner <= OUTER * size)
+        knots += [(first, low + first)] * (TOUCH < first <= OUTER * size)
+        knots += [(size - second, low + length - second)] * (TOUCH < second <= OUTER * size)
     knots.append((size, low + length))
     return np.array([old for old, _ in knots]), np.array([new for _, new in knots])
 
@@ -227,9 +226,9 @@ def _closed(placed: Placed) -> Placed:
 
 def _planes(sheet: StyleSheet, source: StyleBlock, axis: int) -> tuple[float, float]:
     """Return how far inside a block's two sides across an axis most of their wall stands (m)."""
-    low, high = (("left", "right"), ("front", "back"))[axis]
     size = source.size[axis]
-    return _main_plane(sheet, source.id, low, size), _main_plane(sheet, source.id, high, size)
+    low, high = (_main_plane(sheet, source.id, side, size) for side in ACROSS[axis])
+    return low, high
 
 
 def _main_plane(sheet: StyleSheet, block: str, side: str, size: float) -> float:
@@ -293,7 +292,7 @@ def _supported(sheet: StyleSheet, placed: list[Placed], pair: tuple[int, int]) -
     lower, upper = placed[pair[0]], placed[pair[1]]
     reaching = _overhanging(sheet, lower, upper)
     maps = []
-    for axis, sides in ((0, ("left", "right")), (1, ("front", "back"))):
+    for axis, sides in enumerate(ACROSS):
         old, new = lower.maps[axis]
         size = float(old[-1])
         thickness = [_thickness(sheet, lower.source.id, side) for side in sides]

@@ -176,7 +176,7 @@ def split(rule: SplitRule, size: float, patience: tuple[float, float] = MARGINS)
 
 
 def _heaped(rule: SplitRule) -> bool:
-    """Tell whether whole repeats would put a cornice or a ground floor into the middle of a face."""
+    """Tell whether whole repeats would put a cornice or a plinth into the middle of a face."""
     return rule.ends and bool(rule.once or not repeat(rule))
 
 

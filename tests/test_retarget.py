@@ -25,16 +25,12 @@ from facade_tools.stylization.capture import capture_style
 from facade_tools.stylization.drawing import sheet_picture
 from facade_tools.stylization.model import CaptureOptions
 from facade_tools.stylization.panels import panels, reassigned
-from facade_tools.stylization.placing import (
-    foreign_blocks,
-    matched_blocks,
-    outset_blocks,
-    placed_blocks,
-    placed_slabs,
-)
+from facade_tools.stylization.placed import placed_slabs
+from facade_tools.stylization.placing import matched_blocks, outset_blocks, placed_blocks
 from facade_tools.stylization.resizing import resized
 from facade_tools.stylization.retarget import retarget
 from facade_tools.stylization.splitting import SplitRule, split
+from facade_tools.stylization.stacking import foreign_blocks
 from facade_tools.stylization.style import Style
 
 SAMPLES = Path(__file__).parent.parent / "sample_data" / "textured"

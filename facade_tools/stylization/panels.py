@@ -9,7 +9,7 @@ import numpy as np
 
 from ..artifacts.stylesheet import StyleBlock, StyleFace, StyleSheet
 from ..geometry.arrays import Booleans, Floats
-from .placing import TOUCH, Placed, face_corners
+from .placed import TOUCH, Placed, face_corners
 from .projection import SIDES
 from .remesh import Slab
 from .splitting import SplitRule

@@ -19,7 +19,7 @@ from ..geometry.triangulate import newell_normal
 from ..imaging.image_io import Picture
 from .atlas import encoded_page
 from .bases import frame_of
-from .placing import TOUCH
+from .placed import TOUCH
 from .retarget import RAISED, framed
 from .splitting import SplitRule
 from .style import Style, group_rule

@@ -19,16 +19,11 @@ from .bays import with_bays
 from .columns import aligned_rules
 from .hull import layers, mass, roofs
 from .panels import SMALL, STEP, Panel, panels, reassigned
-from .placing import (
-    Placed,
-    foreign_blocks,
-    matched_blocks,
-    outset_blocks,
-    placed_blocks,
-    placed_slabs,
-)
+from .placed import Placed, placed_slabs
+from .placing import matched_blocks, outset_blocks, placed_blocks
 from .projection import SIDES
 from .remesh import Slab
+from .stacking import foreign_blocks
 from .style import Style
 from .synthesis import Part, shape_of, synthesised
 

@@ -343,6 +343,23 @@ def test_garage_wants_its_door() -> None:
     assert [p.pointer for p in problems(house(garage))] == ["/boxes/1"]
 
 
+def test_garage_under_the_house_wants_its_door_in_the_wall_of_the_house() -> None:
+    inside = house(Box("garage", "garage", 8, 3, 4, 6, 2.6, Roof("flat")))
+    assert [p.pointer for p in problems(inside)] == ["/boxes/1"]
+    door = Element("garage-door", "panel", 6.5, 0.0, 2.4, 2.1)
+    assert problems(with_front(inside, lambda p: replace(p, elements=(*p.elements, door)))) == []
+    aside = replace(door, u=0.1)
+    wrong = with_front(inside, lambda p: replace(p, elements=(aside,)))
+    assert "a garage door in box 'main', no garage" in [p.message for p in problems(wrong)]
+
+
+def test_garage_behind_porches_wants_no_door() -> None:
+    garage = Box("garage", "garage", 8, 3, 4, 6, 2.6, Roof("flat"))
+    front = Box("porch", "porch", 8, -1, 4, 2, 2.5, Roof("flat"))
+    aside = Box("porch-2", "porch", 11, 3, 2, 6, 2.5, Roof("flat"))
+    assert problems(house(garage, front, aside)) == []
+
+
 def test_partial_building_is_held_to_what_it_says() -> None:
     whole = house()
     partial = replace(whole, partial=True, facades={"front": whole.facades["front"]})

@@ -48,10 +48,10 @@ def test_garage_goes_to_the_walls_that_suit_its_draw():
     assert (px[0], py[0], exposure[0]) == pytest.approx((0.5, 0.375, 0.25))
 
 
-def test_porch_that_stands_free_or_inside_is_moved_to_the_wall():
+def test_porch_that_stands_free_or_reaches_inside_is_moved_to_the_wall():
     assert touching(HOUSE, part(0.5, -0.4, 3, 2), -1)[0] == pytest.approx(-0.125)
-    assert touching(HOUSE, part(0.5, -0.1, 3, 2), -1)[0] == pytest.approx(-0.1)
+    assert touching(HOUSE, part(0.5, -0.1, 3, 2), -1)[0] == pytest.approx(-0.125)
     assert touching(HOUSE, part(0.5, 1.4, 3, 2), 1)[0] == pytest.approx(1.125)
     assert touching(HOUSE, part(0.5, 0.3, 3, 2), -1)[0] == pytest.approx(-0.125)
     assert touching(HOUSE, part(0.5, 0.7, 3, 2), 1)[0] == pytest.approx(1.125)
-    assert touching(HOUSE, part(0.9, 0.3, 3, 2), -1)[0] == pytest.approx(0.3)
+    assert touching(HOUSE, part(1.15, 0.3, 3, 2), -1)[0] == pytest.approx(0.3)

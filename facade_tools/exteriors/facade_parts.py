@@ -48,7 +48,8 @@ class Codes:
 class MainDoor:
     """Where the main door may be: piece, range of its centre (m), substyle, share in the middle.
 
-    A door that is `sheltered` stands behind a porch, and goes before all that are not.
+    rank: whether it is in a garage, and whether it is not behind a porch. A higher rank is for
+    fronts where none lower has a place, whatever the energy.
     """
 
     piece: int = -1
@@ -56,7 +57,7 @@ class MainDoor:
     high: float = 0.0
     sub: int = 0
     middle: float = 0.0
-    sheltered: bool = False
+    rank: tuple[bool, bool] = (False, False)
 
 
 def part_rows(library: Library, entry: LibraryBuilding) -> list[PartRow]:
@@ -127,10 +128,13 @@ def usual_heads(library: Library, entry: LibraryBuilding) -> tuple[float, float]
 
 
 def fitting_door(rows: Sequence[PartRow], front: Sequence[Piece]) -> list[PartRow]:
-    """Return the substyles with a main door that is no higher than the front allows."""
+    """Return the substyles with a main door that is no higher than the front allows.
+
+    front: the pieces that take elements.
+    """
     *others, door = rows
     width = door.width + 2 * BESIDE_DOOR
-    walls = [p.height for p in front if p.origin[2] < 1e-6 and p.width >= width and not p.elements]
+    walls = [piece.height for piece in front if piece.origin[2] < 1e-6 and piece.width >= width]
     room = max(walls, default=door.height + OVER_DOOR) - OVER_DOOR
     return [*others, replace(door, height=max(min(door.height, room), LEAST_DOOR))]
 
@@ -152,23 +156,20 @@ def main_doors(
             continue
         porch = _porch_range(building, piece)
         low, high = half, piece.width - half
-        anywhere = MainDoor(p, low, high, sub, 0.3)
-        sheltered = porch is not None and max(low, porch[0]) <= min(high, porch[1])
-        if porch is not None and sheltered:
+        garage = kinds[piece.box] != "general"
+        found.append(MainDoor(p, low, high, sub, 0.3, (garage, True)))
+        if porch is not None and max(low, porch[0]) <= min(high, porch[1]):
             low, high = max(low, porch[0]), min(high, porch[1])
-        rank = kinds[piece.box] != "general", not sheltered, -piece.width
-        found.append((rank, MainDoor(p, low, high, sub, 0.6 if sheltered else 0.3, sheltered)))
-        if sheltered:  # should posts and roofs leave no place behind the porch
-            found.append(((rank[0], True, -piece.width), anywhere))
-    return [door for _, door in sorted(found, key=lambda row: row[0])]
+            found.append(MainDoor(p, low, high, sub, 0.6, (garage, False)))
+    return sorted(found, key=lambda door: (door.rank, -pieces[door.piece].width))
 
 
 def _porch_range(building: Building, piece: Piece) -> tuple[float, float] | None:
     """Return where along a front piece a porch shelters the wall, half a metre in from its ends."""
     x, y = wall_of("front", piece).start
     for box in building.boxes:
-        before = box.y - box.depth / 2 <= y - LEAST_PORCH and y < box.y + box.depth / 2 + 0.05
-        if box.kind == "porch" and before:
+        touches = box.y - box.depth / 2 < y - 0.05 and box.y + box.depth / 2 > y - 0.05
+        if box.kind == "porch" and touches:
             low, high = box.x - box.width / 2 - x + 0.5, box.x + box.width / 2 - x - 0.5
             if low <= high and high > 0 and low < piece.width:
                 return low, high

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import groupby, islice
 
 import numpy as np
 
@@ -31,7 +32,7 @@ from .palette import house_colors
 log = logging.getLogger("facade_tools.facadegen")
 
 SIMILAR = 3  # buildings that may lend their elements, in random order
-TRIES = 3  # walls in which the main door is tried where the first does not do
+TRIES = 3  # walls of one rank in which the main door is tried where the first does not do
 ENOUGH = 5e-3  # energy over its lower bound that needs no elements of another library building
 GOOD = 2e-3  # energy of a side over its lower bound that needs no further try
 MAIN_DOOR_AREA = 2.0  # set aside before the garage door is chosen (m²)
@@ -173,8 +174,9 @@ class _Attempt:
     def _facades(self, wanted: FacadeAttributes) -> tuple[dict[Side, Facade], float]:
         library = self.shelf.library
         sides = self._standing(wanted)
-        front = next(side.pieces for side in sides if side.name == "front")
-        rows, codes = fitting_door(part_rows(library, self.entry), front), Codes()
+        front = next(side for side in sides if side.name == "front")
+        free = [piece for piece in front.pieces if piece.id not in front.closed]
+        rows, codes = fitting_door(part_rows(library, self.entry), free), Codes()
         heads = storey_heads(self.building, sides, usual_heads(library, self.entry))
         facades: dict[Side, Facade] = {}
         excess = 0.0
@@ -202,7 +204,8 @@ class _Attempt:
         }
         sizes = garage_sizes(library, self.entry)
         doors = garage_doors(self.building, free, blocked, sizes, room)
-        return [_with_elements(side, doors) for side in sides]
+        garages = {box.id for box in self.building.boxes if box.kind == "garage"}
+        return [_with_garage_doors(side, doors, garages) for side in sides]
 
     def _main_doors(
         self,
@@ -215,24 +218,24 @@ class _Attempt:
         if given or standing.name != "front":
             return []
         free = [bool(value) for value in plain.room[:, OPEN]]
-        return main_doors(self.building, standing.pieces, free, rows)[:TRIES]
+        return main_doors(self.building, standing.pieces, free, rows)
 
     def _best(
         self, plain: SearchSide, doors: Sequence[MainDoor], targets: Floats
     ) -> tuple[Solution, int]:
-        """Return the best layout of a side over the walls that may take the main door."""
-        best, main, homeless, sheltered = None, -1, True, False
-        for door in doors or [MainDoor()]:
-            if sheltered and not door.sheltered:
-                break  # a porch without the door is no entrance, whatever the energy
-            side, least = with_door(plain, door, targets)
-            genome, counts, value = search_side(side, self.options.search, least, rng=self.rng)
-            missing = door.piece >= 0 and not has_door(side, genome, counts)
-            if best is None or (missing, value) < (homeless, best.energy):
-                best = Solution(genome, counts, widths(side, genome, counts), value, least)
-                main, homeless = -1 if missing else door.piece, missing
-            sheltered = sheltered or (door.sheltered and not missing)
-            if value <= least + GOOD and not missing:
+        """Return the best layout of a side over the walls of the first rank with room for the door."""
+        best, main, homeless = None, -1, True
+        for _, rank in groupby(doors or [MainDoor()], key=lambda door: door.rank):
+            for door in islice(rank, TRIES):
+                side, least = with_door(plain, door, targets)
+                genome, counts, value = search_side(side, self.options.search, least, rng=self.rng)
+                missing = door.piece >= 0 and not has_door(side, genome, counts)
+                if best is None or (missing, value) < (homeless, best.energy):
+                    best = Solution(genome, counts, widths(side, genome, counts), value, least)
+                    main, homeless = -1 if missing else door.piece, missing
+                if value <= least + GOOD and not missing:
+                    break
+            if not homeless:
                 break
         assert best is not None
         return best, main
@@ -244,6 +247,15 @@ def _with_elements(side: Standing, elements: Mapping[str, tuple[Element, ...]]) 
     return replace(
         side, pieces=pieces, closed=side.closed | {p.id for p in pieces if p.id in elements}
     )
+
+
+def _with_garage_doors(
+    side: Standing, doors: Mapping[str, tuple[Element, ...]], garages: Collection[str]
+) -> Standing:
+    """Return a side with garage doors: a garage's own wall takes no more, a house's wall does."""
+    done = _with_elements(side, doors)
+    own = {p.id for p in done.pieces if p.id in doors and p.box in garages}
+    return replace(done, closed=side.closed | own)
 
 
 def _area(pieces: Sequence[Piece], ratio: float | None) -> float:

@@ -6,7 +6,6 @@ inside its piece and overlaps nothing.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -17,6 +16,7 @@ from ..artifacts.building import SIDES, Box, Building, Element, Piece, Side
 from .arrays import Booleans, Rectangles
 from .blocked import BuiltRoof, blocked_rectangles
 from .floors import TOLERANCE
+from .garage_walls import Stretch, drive_stretch, garage_stretch
 from .pieces import facade_pieces
 
 NEAR = 1e-4  # what is closer than this is in the same place (m)
@@ -269,28 +269,45 @@ def _is_entrance(item: _Placed) -> bool:
 def _garage_problems(
     building: Building, roof: BuiltRoof, placed: list[_Placed]
 ) -> Iterator[Problem]:
-    garages = {box.id for box in building.boxes if box.kind == "garage"}
+    garages = {i: box for i, box in enumerate(building.boxes) if box.kind == "garage"}
     doors = [item for item in placed if item.element.kind == "garage-door"]
     for item in doors:
-        if item.piece.box not in garages and not item.element.known and garages:
+        if garages and not item.element.known and not _of_any(garages.values(), item):
             yield Problem(item.pointer, f"a garage door in box {item.piece.box!r}, no garage")
     if len(building.facades) == len(SIDES):
-        have = Counter(item.piece.box for item in doors)
-        for i, box in enumerate(building.boxes):
-            if box.id in garages and not have[box.id] and _has_garage_wall(building, roof, box.id):
+        for i, box in garages.items():
+            closed = not any(_of_any([box], item) for item in doors)
+            if closed and _has_garage_wall(building, roof, box):
                 yield Problem(f"/boxes/{i}", "a garage with an exposed wall but no garage door")
 
 
-def _has_garage_wall(building: Building, roof: BuiltRoof, box: str) -> bool:
+def _of_any(garages: Iterable[Box], door: _Placed) -> bool:
+    """Tell whether a door leads into one of the garages."""
     return any(
-        piece.box == box and piece.origin[2] < NEAR and _takes_door(building, roof, side, piece)
+        door.piece.box == garage.id or _within(garage_stretch(garage, door.side, door.piece), door)
+        for garage in garages
+    )
+
+
+def _within(stretch: Stretch | None, door: _Placed) -> bool:
+    e = door.element
+    return stretch is not None and stretch[0] - NEAR <= e.u <= stretch[1] - e.width + NEAR
+
+
+def _has_garage_wall(building: Building, roof: BuiltRoof, garage: Box) -> bool:
+    return any(
+        _takes_door(building, roof, garage, side, piece)
         for side, facade in building.facades.items()
         for piece in facade.pieces
     )
 
 
-def _takes_door(building: Building, roof: BuiltRoof, side: Side, piece: Piece) -> bool:
-    """Tell whether a ground piece is large and free enough that its garage needs a door."""
-    if piece.width < GARAGE_WALL[0] or piece.height < GARAGE_WALL[1]:
+def _takes_door(
+    building: Building, roof: BuiltRoof, garage: Box, side: Side, piece: Piece
+) -> bool:
+    """Tell whether a piece has enough free wall of a garage that the garage needs a door."""
+    stretch = drive_stretch(building, garage, side, piece)
+    if stretch is None or stretch[1] - stretch[0] < GARAGE_WALL[0] or piece.height < GARAGE_WALL[1]:
         return False
-    return not (blocked_rectangles(building, roof, side, piece)[:, 1] < GARAGE_WALL[1]).any()
+    rows = blocked_rectangles(building, roof, side, piece)
+    return not overlaps(np.array([[stretch[0], 0.0, stretch[1], GARAGE_WALL[1]]]), rows).any()

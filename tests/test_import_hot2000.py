@@ -155,9 +155,19 @@ def test_entry_errors_are_clipped_or_refused_and_counted() -> None:
     assert sum(notes.values()) == 1
 
 
-def test_a_ceiling_that_does_not_tell_its_roof_leaves_the_unseen_open() -> None:
-    roof = imported(ceilings=[{"type": "Attic/hip"}, {"type": "Cathedral"}])[0].element.roof
-    assert roof == {"flat": None, "gable": None, "hip": 1}
+@pytest.mark.parametrize(
+    ("ceilings", "roof"),
+    [
+        (["Attic/hip", "Cathedral"], {"flat": 0, "gable": 0, "hip": 1}),
+        (["Cathedral", "Scissor"], {"flat": 0, "gable": None, "hip": None}),
+        (["Flat", "Cathedral"], {"flat": 1, "gable": None, "hip": None}),
+        (["Attic/gable", "Thatched"], {"flat": None, "gable": 1, "hip": None}),
+        ([], {"flat": None, "gable": None, "hip": None}),
+    ],
+)
+def test_a_sloping_ceiling_lies_under_the_roof_of_an_attic_beside_it(ceilings, roof) -> None:
+    house = imported(ceilings=[{"type": ceiling} for ceiling in ceilings])[0]
+    assert house.element.roof == roof
 
 
 def test_a_line_that_is_no_house_is_refused_with_its_reason() -> None:

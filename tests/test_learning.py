@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 import pytest
 from learned_tables import as_readings, table_layout
-from scipy.special import gammaln
+from scipy.special import betaln, gammaln
 
 from facade_tools.artifacts.attributes import FacadeAttributes
 from facade_tools.artifacts.store import read_whole
@@ -17,7 +17,15 @@ from facade_tools.errors import InvalidInput
 from facade_tools.exteriors import em, mixture, styles
 from facade_tools.exteriors.coordinates import Readings, read_attributes
 from facade_tools.exteriors.dataset import build, fit_scaling
-from facade_tools.exteriors.em import Prior, Statistics, Stop, run, unit_weights
+from facade_tools.exteriors.em import (
+    Prior,
+    Statistics,
+    Stop,
+    beta_mode,
+    bit_pseudo_counts,
+    run,
+    unit_weights,
+)
 from facade_tools.exteriors.evaluation import negative_log_density
 from facade_tools.exteriors.holdout import BuildingRows, compare_variants, splits, training_curve
 from facade_tools.exteriors.layout import building_layout
@@ -245,10 +253,23 @@ def test_cheeseman_stutz_equals_enumeration():
     expected = loglik + gaussian_part(stats, family, prior)
     expected += table_part(counts.sum(axis=1), network.style, prior.style)
     expected += table_part(counts, family.hidden, prior.hidden)
-    pairs = np.stack([network.bits, 1 - network.bits], axis=-1)
-    expected += table_part(np.stack([ones, zeros], axis=-1), pairs, prior.bit)
+    pseudo = bit_pseudo_counts(1.0 * (data.bits == 1), 1.0 * (data.bits == 0), prior)
+    for b, (a, c) in enumerate(zip(*(1 + pseudo), strict=True)):
+        p, one, zero = network.bits[:, b], ones[:, b], zeros[:, b]
+        expected += (betaln(a + one, c + zero) - betaln(a, c)).sum()
+        expected -= (one * np.log(p) + zero * np.log(1 - p)).sum()
     found = cheeseman_stutz(network, data, unit_weights(data), posterior, prior)
     assert found == pytest.approx(expected)
+
+
+def test_bit_that_a_style_does_not_know_has_the_share_of_all_rows():
+    one, zero = np.zeros((10, 1)), np.ones((10, 1))
+    one[0], zero[0] = 1.0, 0.0
+    pseudo = bit_pseudo_counts(one, zero, Prior())
+    style = np.stack([np.ones(10), np.zeros(10)])
+    chance = beta_mode(style @ one, style @ zero, pseudo)
+    assert chance[1, 0] == pytest.approx(1.5 / 11)
+    assert chance[0, 0] == pytest.approx((1 + 1.5 / 11) / 11)
 
 
 # --- whole runs ---------------------------------------------------------------------------------

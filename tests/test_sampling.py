@@ -25,6 +25,7 @@ from facade_tools.exteriors.prior import shipped_prior
 from facade_tools.exteriors.relations import contradictions
 from facade_tools.exteriors.row_bytes import Row, joined, text_column
 from facade_tools.exteriors.sample_lines import sample_lines
+from facade_tools.exteriors.sampling import draw_bits
 from facade_tools.exteriors.serialisation import network_of
 from facade_tools.exteriors.transforms import forward
 
@@ -32,6 +33,18 @@ from facade_tools.exteriors.transforms import forward
 @pytest.fixture(scope="module")
 def houses():
     return shipped_prior()
+
+
+def test_roof_bits_are_as_frequent_as_their_style_has_them(model):
+    network = network_of(model)
+    roofs = [i for i, name in enumerate(network.layout.bits) if name.startswith("roof.")]
+    for shares in ([0.2, 0.6, 0.4], [0.05, 0.7, 0.25], [0.1, 1.0, 0.1]):
+        bits = network.bits.copy()
+        bits[:, roofs] = shares
+        styles = np.zeros(20_000, dtype=np.int64)
+        drawn = draw_bits(replace(network, bits=bits), styles, np.random.default_rng(1))[:, roofs]
+        assert drawn.any(axis=1).all()
+        assert drawn.mean(axis=0) == pytest.approx(shares, abs=0.012)
 
 
 @pytest.fixture(scope="module")

@@ -21,7 +21,7 @@ from .kernels_conjugate import (
     regressed,
     state_counts,
 )
-from .network import Family, Network, Pooled, Posterior, Weights, infer, inputs_of
+from .network import Family, Network, Pooled, Posterior, Weights, infer, inputs_of, log_
 
 NOTHING = 1e-9
 
@@ -30,8 +30,9 @@ NOTHING = 1e-9
 class Prior:
     """Strength of the priors, in rows of data.
 
-    style, hidden, table, bit: Dirichlet pseudo-counts, spread evenly over the states (hidden: over
-    the group's own cluster shares). mean: of cluster means around the overall mean. slope: of
+    style, hidden, table: Dirichlet pseudo-counts, spread evenly over the states (hidden: over the
+    group's own cluster shares). bit: Beta pseudo-counts, spread as the bit is over all rows: where
+    few rows know it, its styles would otherwise all move towards one half. mean: of cluster means around the overall mean. slope: of
     lateral coefficients around 0. spread, freedom: Wishart on the precision with d + freedom
     degrees; the covariance is expected near (d + freedom) · `spread` of the overall variance. With
     lateral parents, overall means what the regression of all rows on them says (`Pooled`).
@@ -154,11 +155,13 @@ def _atoms(counts: Floats, tied: bool, prior: Prior) -> Floats:
 # --- prior density ------------------------------------------------------------------------------
 
 
-def log_prior(network: Network, prior: Prior) -> float:
-    """Return the log prior density of all parameters, up to a constant of the structure."""
+def log_prior(network: Network, prior: Prior, pseudo: Floats) -> float:
+    """Return the log prior density of all parameters, up to a constant of the structure.
+
+    pseudo (2, b): as `bit_pseudo_counts` gives them.
+    """
     total = _log_dirichlet(network.style[None], prior.style)
-    both = np.stack([network.bits, 1 - network.bits], axis=-1)
-    total += _log_dirichlet(both, prior.bit)
+    total += float((pseudo[0] * log_(network.bits) + pseudo[1] * log_(1 - network.bits)).sum())
     for family in network.families:
         if not family.direct:
             total += _log_dirichlet(family.hidden, prior.hidden)
@@ -239,14 +242,32 @@ def step(
 
 def fit_bits(data: Dataset, weights: Weights, style: Floats, prior: Prior) -> Floats:
     """Return the MAP probability of each bit given S, (|S|, b)."""
-    one = style.T @ (weights.bits * (data.bits == 1))
-    zero = style.T @ (weights.bits * (data.bits == 0))
-    return np.asarray((one + prior.bit / 2) / (one + zero + prior.bit))
+    one, zero = weights.bits * (data.bits == 1), weights.bits * (data.bits == 0)
+    pseudo = bit_pseudo_counts(one, zero, prior)
+    return beta_mode(style.T @ one, style.T @ zero, pseudo)
 
 
-def objective(network: Network, posterior: Posterior, weights: Weights, prior: Prior) -> float:
+def bit_pseudo_counts(one: Floats, zero: Floats, prior: Prior) -> Floats:
+    """Return the pseudo-counts (2, b) of ones and zeros, one row's weight spread as all rows are.
+
+    one, zero (n, b): weights of the rows in which a bit is 1, or 0. A bit has no share of 0 or 1:
+    half a one and half a zero are added.
+    """
+    ones = one.sum(axis=0)
+    share = (ones + 0.5) / (ones + zero.sum(axis=0) + 1.0)
+    return prior.bit * np.stack([share, 1 - share])
+
+
+def beta_mode(one: Floats, zero: Floats, pseudo: Floats) -> Floats:
+    """Return the MAP probabilities (|S|, b) of counts (|S|, b)."""
+    return np.asarray((one + pseudo[0]) / (one + zero + pseudo.sum(axis=0)))
+
+
+def objective(
+    network: Network, posterior: Posterior, weights: Weights, prior: Prior, pseudo: Floats
+) -> float:
     """Return weighted log likelihood plus log prior."""
-    return float(weights.style @ posterior.log_density) + log_prior(network, prior)
+    return float(weights.style @ posterior.log_density) + log_prior(network, prior, pseudo)
 
 
 def run(
@@ -262,12 +283,14 @@ def run(
     weights = weights or unit_weights(data)
     posterior = infer(network, data, weights)
     floor = floor or cluster_floors(network, data, weights, posterior)
-    trace = [objective(network, posterior, weights, prior)]
+    one, zero = weights.bits * (data.bits == 1), weights.bits * (data.bits == 0)
+    pseudo = bit_pseudo_counts(one, zero, prior)
+    trace = [objective(network, posterior, weights, prior, pseudo)]
     for _ in range(stop.iterations):
         before = network
         network = step(network, data, weights, floor, prior, posterior)
         posterior = infer(network, data, weights)
-        trace.append(objective(network, posterior, weights, prior))
+        trace.append(objective(network, posterior, weights, prior, pseudo))
         if _settled(trace, before, network, stop):
             break
     return Fit(network, tuple(trace), posterior)

@@ -16,6 +16,8 @@ from .physical import settle
 from .shared_values import SharedValues, take_up
 
 BLOCK = 4096
+LEAST_CHANCE = 1e-6  # of any bit; the draws are then of single bits
+HALVINGS = 50  # of the range of that chance
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +63,10 @@ def pick(probabilities: Floats, rng: np.random.Generator) -> Ints:
 def draw_bits(
     network: Network, styles: Ints, rng: np.random.Generator, known: Bits | None = None
 ) -> Bits:
-    """Return bits (n, b), those of `known` (b,) kept; every building has some kind of roof."""
+    """Return bits (n, b), those of `known` (b,) kept; every building has some kind of roof.
+
+    Each kind is as frequent as the style has it: `some_kind`.
+    """
     probability = network.bits[styles]
     bits = (rng.random(probability.shape) < probability).astype(np.int8)
     if known is not None:
@@ -73,9 +78,27 @@ def draw_bits(
             seen = known[roofs]
             words = words[((words == seen) | (seen < 0)).all(axis=1)]
         if len(words):
-            odds = np.exp(bit_log_density(probability[:, roofs], words)).T + 1e-300
-            bits[:, roofs] = words[pick(odds / odds.sum(axis=1, keepdims=True), rng)]
+            odds = np.exp(bit_log_density(some_kind(network.bits[:, roofs]), words)).T + 1e-300
+            bits[:, roofs] = words[pick((odds / odds.sum(axis=1, keepdims=True))[styles], rng)]
     return bits
+
+
+def some_kind(share: Floats) -> Floats:
+    """Return probabilities of independent bits that have the shares (n, b) where any bit is 1.
+
+    To drop the draws without a bit and take the rest would make every kind, and several at once,
+    more frequent than they are. With p = share · z the shares hold for z = 1 − Π(1 − share · z),
+    the chance of any bit; shares that sum to 1 or less leave just one bit a draw.
+
+    >>> some_kind(np.array([[0.6, 0.5]])).round(3).tolist()
+    [[0.2, 0.167]]
+    """
+    low, high = np.full((len(share), 1), LEAST_CHANCE), np.ones((len(share), 1))
+    for _ in range(HALVINGS):
+        z = (low + high) / 2
+        above = 1 - np.prod(1 - share * z, axis=1, keepdims=True) < z
+        low, high = np.where(above, low, z), np.where(above, z, high)
+    return np.asarray(share * high)
 
 
 def draw_groups(

@@ -7,12 +7,14 @@ network adds its own `marginal − complete`; only log P(O|G, Θ) needs them all
 from __future__ import annotations
 
 import numpy as np
+from scipy.special import betaln
 
 from .coordinates import Floats
 from .dataset import Dataset
 from .em import (
     Prior,
     Statistics,
+    bit_pseudo_counts,
     posterior_moments,
     prior_precision,
     statistics,
@@ -20,7 +22,7 @@ from .em import (
     wishart_scale,
 )
 from .kernels_conjugate import dirichlet_part, log_completes, log_marginals
-from .network import Family, Network, Pooled, Posterior, Weights
+from .network import Family, Network, Pooled, Posterior, Weights, log_
 
 
 def table_part(counts: Floats, p: Floats, strength: float) -> float:
@@ -76,10 +78,18 @@ def family_part(stats: Statistics, family: Family, prior: Prior) -> float:
 
 def bits_part(data: Dataset, weights: Weights, style: Floats, p: Floats, prior: Prior) -> float:
     """Return marginal minus complete of the bits given S."""
-    one = style.T @ (weights.bits * (data.bits == 1))
-    zero = style.T @ (weights.bits * (data.bits == 0))
-    counts = np.stack([one, zero], axis=-1)
-    return table_part(counts, np.stack([p, 1 - p], axis=-1), prior.bit)
+    one, zero = weights.bits * (data.bits == 1), weights.bits * (data.bits == 0)
+    return beta_part(style.T @ one, style.T @ zero, p, bit_pseudo_counts(one, zero, prior))
+
+
+def beta_part(one: Floats, zero: Floats, p: Floats, pseudo: Floats) -> float:
+    """Return log marginal minus log likelihood of expected counts of bits (|S|, b).
+
+    The marginal is under Beta(1 + pseudo), whose mode `em.beta_mode` takes.
+    """
+    a, b = 1 + pseudo
+    marginal = betaln(a + one, b + zero) - betaln(a, b)
+    return float((marginal - one * log_(p) - zero * log_(1 - p)).sum())
 
 
 def cheeseman_stutz(

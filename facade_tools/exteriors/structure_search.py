@@ -23,7 +23,7 @@ from .lateral import Inputs, acyclic, admissible, crowded, parent_of
 from .layout import Layout
 from .mixture import Local, Task
 from .network import Network, Weights
-from .score import family_part, table_part
+from .score import beta_part, family_part, table_part
 from .styles import Evidence, Rows, Upper
 
 log = logging.getLogger(__name__)
@@ -129,8 +129,8 @@ class Search:
         rows, prior = self.rows, self.prior
         total = float(rows.style_weight @ upper.log_density)
         total += table_part(rows.style_weight @ upper.posterior, upper.style, prior.style)
-        counts = np.stack(styles.bit_counts(rows, upper.posterior), axis=-1)
-        total += table_part(counts, np.stack([upper.bits, 1 - upper.bits], axis=-1), prior.bit)
+        one, zero = styles.bit_counts(rows, upper.posterior)
+        total += beta_part(one, zero, upper.bits, rows.pseudo)
         starts = np.cumsum([0, *sizes])
         total += dirichlet_part(upper.counts, upper.hidden, starts, prior.hidden)
         total += sum(self.family(g, size, inputs[g])[1] for g, size in enumerate(sizes))

@@ -11,7 +11,7 @@ from scipy.linalg import eigh
 from ..compiled import compiled
 from .coordinates import Bits, Floats
 from .dataset import Dataset
-from .em import NOTHING, Prior, fit_table
+from .em import NOTHING, Prior, beta_mode, bit_pseudo_counts, fit_table
 from .kernels_conjugate import fitted_tables
 from .network import Weights
 
@@ -111,11 +111,15 @@ class Upper:
 
 @dataclass(frozen=True, slots=True)
 class Rows:
-    """What does not change while the upper half is fitted: bits, weights and priors."""
+    """What does not change while the upper half is fitted: bits, weights and priors.
+
+    one, zero (n, b): weights of the rows in which a bit is 1, or 0; pseudo (2, b): its prior.
+    """
 
     bits: Bits
     one: Floats
     zero: Floats
+    pseudo: Floats
     style_weight: Floats
     group_weight: Floats
     prior: Prior
@@ -123,10 +127,12 @@ class Rows:
 
 def rows_of(data: Dataset, weights: Weights, prior: Prior) -> Rows:
     """Return the fixed part of the rows."""
+    one, zero = weights.bits * (data.bits == 1), weights.bits * (data.bits == 0)
     return Rows(
         data.bits,
-        weights.bits * (data.bits == 1),
-        weights.bits * (data.bits == 0),
+        one,
+        zero,
+        bit_pseudo_counts(one, zero, prior),
         weights.style,
         np.ascontiguousarray(np.stack(weights.groups, axis=1)),
         prior,
@@ -171,10 +177,10 @@ def bit_counts(rows: Rows, posterior: Floats) -> tuple[Floats, Floats]:
 def maximise(rows: Rows, shown: Evidence, posterior: Floats, counts: Floats) -> Upper:
     """Return the upper half after an M-step, and the E-step that follows it."""
     one, zero = bit_counts(rows, posterior)
-    bits = (one + rows.prior.bit / 2) / (one + zero + rows.prior.bit)
+    bits = beta_mode(one, zero, rows.pseudo)
     style = fit_table(rows.style_weight @ posterior, rows.prior.style)
     hidden = normalised(counts, shown.starts, rows.prior.hidden)
-    return expect(rows, shown, style, np.asarray(bits), hidden)
+    return expect(rows, shown, style, bits, hidden)
 
 
 def first(rows: Rows, shown: Evidence, posterior: Floats) -> Upper:

@@ -14,7 +14,7 @@ import numpy as np
 from . import mixture
 from .coordinates import Floats
 from .dataset import Dataset, Scaling
-from .em import Fit, Prior, Stop, run
+from .em import Fit, Prior, Stop, fit_bits, run
 from .lateral import Inputs, acyclic, admissible
 from .layout import Layout
 from .mixture import Local, Task, reshaped
@@ -81,10 +81,8 @@ def direct_network(rows: Rows, posterior: Floats, families: tuple[Family, ...]) 
         for g, family in enumerate(families)
     )
     mass = rows.weights.style @ posterior
-    bits = rows.data.bits
-    one, zero = (posterior.T @ (rows.weights.bits * (bits == v)) for v in (1, 0))
-    chance = (one + rows.prior.bit / 2) / (one + zero + rows.prior.bit)
-    return Network(rows.layout, rows.scalings, mass / mass.sum(), chance, fitted)
+    bits = fit_bits(rows.data, rows.weights, posterior, rows.prior)
+    return Network(rows.layout, rows.scalings, mass / mass.sum(), bits, fitted)
 
 
 def direct_sweep(rows: Rows, inputs: tuple[Inputs, ...], largest: int) -> Iterator[Scored]:

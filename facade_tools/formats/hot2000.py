@@ -60,6 +60,7 @@ LEVELS = (
     (0, re.compile(r"main|rdc|\brc\b|rez|princ|1st|first|\b1er|\b1l|\bmf\b|ground")),
 )
 ROOF_OF_CEILING = {"Attic/gable": "gable", "Attic/hip": "hip", "Flat": "flat"}
+SLOPING = ("Cathedral", "Scissor")  # ceilings under a gable or a hip
 STYLE_OF_WINDOW = {
     "Picture": "fixed",
     "Hinged": "casement",
@@ -337,10 +338,16 @@ def _area(window: Window, notes: Counter[str]) -> float:
 
 
 def _roof_bits(ceilings: tuple[str, ...]) -> dict[str, Bit]:
-    """Return 1 for what is seen; what is not seen is 0 only if every ceiling tells its roof."""
+    """Return 1 for what is seen, 0 for the rest; null where a ceiling may lie under any of it.
+
+    A sloping ceiling beside an attic lies under the attic's roof. Were the rest null there, a
+    second kind would be known wherever it stands and nowhere that it does not.
+    """
     seen = {ROOF_OF_CEILING[ceiling] for ceiling in ceilings if ceiling in ROOF_OF_CEILING}
-    told = bool(ceilings) and all(ceiling in ROOF_OF_CEILING for ceiling in ceilings)
-    return {name: 1 if name in seen else 0 if told else None for name in ROOF_BITS}
+    rest = [ceiling for ceiling in ceilings if ceiling not in ROOF_OF_CEILING]
+    sloping = bool(ceilings) and all(ceiling in SLOPING for ceiling in rest)
+    told = {name: sloping and (not rest or name == "flat" or bool(seen - {"flat"})) for name in ROOF_BITS}
+    return {name: 1 if name in seen else 0 if told[name] else None for name in ROOF_BITS}
 
 
 def _styles(windows: tuple[Window, ...]) -> dict[str, Bit]:

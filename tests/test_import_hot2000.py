@@ -155,6 +155,12 @@ def test_entry_errors_are_clipped_or_refused_and_counted() -> None:
     assert sum(notes.values()) == 1
 
 
+def test_an_area_of_about_one_floor_says_nothing_of_the_second() -> None:
+    house, notes = imported(area_above=84.0)
+    assert (house.mass.far, house.mass.arf) == (None, (None, None, None))
+    assert list(notes) == ["upper floor area does not fit the main floor's: far and arf refused"]
+
+
 @pytest.mark.parametrize(
     ("ceilings", "roof"),
     [

@@ -21,7 +21,13 @@ from facade_tools.exteriors.attributes import (
 from facade_tools.exteriors.mass_candidates import mass_distance
 from facade_tools.exteriors.mass_energy import layout_energy, mass_energy, target_of
 from facade_tools.exteriors.mass_layout import new_layout, new_work
-from facade_tools.exteriors.mass_roofs import roof_height, under_tower
+from facade_tools.exteriors.mass_roofs import (
+    RoofPlan,
+    chimney_of,
+    roof_height,
+    roofed,
+    under_tower,
+)
 from facade_tools.exteriors.massgen import generate_mass
 from facade_tools.geometry.boxes import box_rectangles, shared_outline
 from facade_tools.geometry.floors import floor_rectangles
@@ -307,3 +313,22 @@ def test_view_shows_plan_and_energy_curve(facade, tmp_path):
     assert plan.shape == drawn.shape == (150, 200, 3)
     assert (plan[75, 100] != plan[0, 0]).any()
     assert mass_pictures(replace(building, tags={}), (200, 150))[1].shape == (150, 200, 3)
+
+
+@pytest.mark.parametrize(("low", "style"), [(3.6, "gable"), (5.2, "flat")])
+def test_gable_of_a_garage_does_not_stick_out_of_the_house_above_it(low, style):
+    main = Box("main", "general", 6.5, 5, 13, 10, 5.4)
+    garage = Box("garage", "garage", 10, 3.5, 5, 7, low)
+    built = roofed((garage, main), RoofPlan(("gable",), 42.0, 0.4), tower=False)
+    assert [box.id for box in built] == ["garage", "main"]
+    assert built[0].roof.style == style
+    assert roof_height(built[:1], 10, 0) <= 5.4
+    assert built[1].roof.pitch == 42.0
+
+
+def test_chimney_keeps_away_from_the_tower():
+    main = Box("main", "general", 6, 4, 12, 8, 5.4, Roof("gable", 30, "x"))
+    tower = Box("tower", "general", 1.5, 4, 3, 3, 6.3, Roof("cone", 58, "x"))
+    for seed in range(20):
+        chimney = chimney_of((main, tower), rng=np.random.default_rng(seed))
+        assert chimney.x > 6

@@ -337,6 +337,15 @@ def test_a_second_floor_of_almost_nothing_is_none(model):
     assert (r1 == 0).all()
 
 
+def test_porch_before_the_house_is_no_wider_than_the_house(model):
+    for sample in draw(model, 500):
+        width = sample.mass.bbox[0]
+        for (px, py, size, *_), front in zip(sample.mass.porch, (True, False), strict=True):
+            if size and (py < 0 if front else py > 1) and abs(px - 0.5) < 0.5:
+                assert size <= width * (1 + 1e-9)
+                assert sample.mass.garage[2] or abs(px - 0.5) + size / width / 2 <= 0.5 + 1e-9
+
+
 def test_top_is_sorted_and_distinct(model):
     samples = draw(model, 10, top=True)
     density = [a.sample.log_density for a in samples]

@@ -7,7 +7,7 @@ wings run into each other (geometry/solids.py takes the upper envelope of the bo
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,8 +18,10 @@ from ..geometry.floors import FLOORS
 from .mass_taste import TOWER_RATIO, TOWER_WIDTH
 
 CHIMNEY = 0.7  # width of a chimney (m)
+BESIDE_TOWER = 2.0  # least distance of a chimney from a tower, where the ridge allows (m)
 CHIMNEY_ABOVE = 0.7  # a chimney's top above the highest roof it passes (m)
 CONE_PITCH = 58.0
+LEAST_PITCH = 12.0  # of gables and hips (degrees)
 TOWER_STEP = 0.9  # a tower's eaves above those of the house, where the floors allow (m)
 TOP_STOREY = 2.3  # wall left to the top storey under a tower (m)
 STEEP_STOREY = 2.2  # a mansard's lower slope at most (m)
@@ -62,10 +64,37 @@ def roofed(boxes: Sequence[Box], plan: RoofPlan, *, tower: bool) -> tuple[Box, .
         if box.roof is None and box is not high:
             chosen[box.id] = styles.pop(0) if styles else plan.styles[0]
     main = by_size[0] if by_size else None
-    return tuple(
-        box if box.roof else replace(box, roof=_roof(box, boxes, plan, chosen.get(box.id), main))
-        for box in boxes
-    )
+    done = {box.id: box for box in boxes if box.roof is not None}
+    for box in sorted(boxes, key=lambda box: -(box.height or 0.0)):
+        if box.roof is None:
+            roof = _roof(box, boxes, plan, chosen.get(box.id), main)
+            done[box.id] = replace(box, roof=_under_higher(box, roof, done.values()))
+    return tuple(done[box.id] for box in boxes)
+
+
+def _under_higher(box: Box, roof: Roof, higher: Iterable[Box]) -> Roof:
+    """Return a gable so low that its end does not stick out of a higher box that it runs into.
+
+    A lower box may reach the outer wall of a higher one, as a garage under an upper storey does.
+    Where a roof of `LEAST_PITCH` were still too high, a garage gets none of its own; a general
+    box keeps that, as it may carry the building's only gable.
+    """
+    if roof.style != "gable" or box.kind == "porch":
+        return roof
+    along_x = roof.direction == "x"
+    half = (box.width if along_x else box.depth) / 2
+    ends = [
+        (box.x + turn * half * along_x, box.y + turn * half * (not along_x)) for turn in (-1, 1)
+    ]
+    covers = [other for other in higher if (other.height or 0.0) > (box.height or 0.0) + 1e-6]
+    rooms = [top - (box.height or 0.0) for x, y in ends if (top := roof_height(covers, x, y)) > 0]
+    span = box.depth if along_x else box.width
+    pitch = math.degrees(math.atan(min(rooms, default=math.inf) / (span / 2)))
+    if pitch >= roof.pitch:
+        return roof
+    if pitch < LEAST_PITCH and box.kind == "garage":
+        return Roof("flat")
+    return replace(roof, pitch=max(math.floor(pitch), LEAST_PITCH))
 
 
 def _style(box: Box) -> str:
@@ -111,7 +140,7 @@ def _pitch(box: Box, direction: Axis, pitch: float) -> float:
     """Return the building's pitch, less where the span would make a roof higher than 4.5 m."""
     span = box.depth if direction == "x" else box.width
     steepest = math.degrees(math.atan(4.5 / (span / 2)))
-    return round(max(min(pitch, steepest), 12.0), 1)
+    return round(max(min(pitch, steepest), LEAST_PITCH), 1)
 
 
 def _porch_roof(box: Box, boxes: Sequence[Box], plan: RoofPlan) -> Roof:
@@ -232,7 +261,10 @@ def _rise(box: Box, x: float, y: float) -> float:
 
 
 def chimney_of(boxes: Sequence[Box], *, rng: np.random.Generator) -> Chimney | None:
-    """Return a chimney on the main box: on its ridge, or inside its outer wall under the ridge."""
+    """Return a chimney on the main box: on its ridge, or inside its outer wall under the ridge.
+
+    Where a tower stands at one end it is the other.
+    """
     hosts = [b for b in boxes if b.kind == "general" and b.roof and b.roof.style != "cone"]
     if not hosts:
         return None
@@ -245,8 +277,21 @@ def chimney_of(boxes: Sequence[Box], *, rng: np.random.Generator) -> Chimney | N
     )
     reach = max(length / 2 - inset, 0.0)
     share = float(rng.choice([-1.0, -0.6, 0.6, 1.0]))
-    shift = round(share * reach, 3)
-    x, y = (main.x + shift, main.y) if along_x else (main.x, main.y + shift)
+    places = [
+        (main.x + shift, main.y) if along_x else (main.x, main.y + shift)
+        for shift in (round(share * reach, 3), round(-share * reach, 3))
+    ]
+    x, y = next((place for place in places if not _by_tower(boxes, *place)), places[0])
     corners = [(x + i * size / 2, y + j * size / 2) for i in (-1, 0, 1) for j in (-1, 0, 1)]
     top = max(roof_height(boxes, *corner) for corner in corners) + CHIMNEY_ABOVE
     return Chimney(round(x, 6), round(y, 6), round(size, 3), round(size, 3), round(top, 3))
+
+
+def _by_tower(boxes: Sequence[Box], x: float, y: float) -> bool:
+    """Tell whether a point of the plan is close to a tower."""
+    return any(
+        abs(x - box.x) < box.width / 2 + BESIDE_TOWER
+        and abs(y - box.y) < box.depth / 2 + BESIDE_TOWER
+        for box in boxes
+        if box.roof and box.roof.style == "cone"
+    )

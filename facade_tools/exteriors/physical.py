@@ -94,7 +94,7 @@ def settle(
     """Move complete rows, in place, to what is possible.
 
     Ranges; r2 only above an r1; the garage inside the bounding box and not higher; porches on
-    their side of the middle, outside the garage and open to one side; at a full rectangle,
+    their side of the middle, outside the garage, no wider than the house and open to one side; at a full rectangle,
     exposures as places fix them (`full_plans`). fixed (n, d) a group: 1 where a value is given and
     must stay.
     """
@@ -110,9 +110,28 @@ def settle(
             limit = MIDDLE + sign * GAP
             moved = np.minimum(place[0], limit) if sign < 0 else np.maximum(place[0], limit)
             _put(place[0], moved, held, f"{name}.py")
+            _along_house(columns, held, name, sign)
             _out_of_garage(columns, held, name, sign)
             _open_side(columns, held, name)
             _settle_porch(columns, held, name, sign)
+
+
+def _along_house(columns: Columns, held: Columns | None, name: str, sign: int) -> None:
+    """Keep a porch that stands before the house within the house's width: it leans on its wall.
+
+    One that stands beside the house, or in a recess of its plan, stays.
+    """
+    house, porch = columns.get(*HOUSE), columns.get(f"{name}.px", f"{name}.py", f"{name}.width")
+    if not house or not porch:
+        return
+    width, _, bcr = house
+    px, py, size = porch
+    with np.errstate(invalid="ignore"):  # absent parts are infinite and left alone
+        before = ((py - MIDDLE) * sign > MIDDLE) | (np.abs(bcr - 1) <= ATOM_TOLERANCE)
+        before &= np.abs(px - MIDDLE) < MIDDLE + size / width / 2
+        _put(size, np.where(before, np.minimum(size, width), size), held, f"{name}.width")
+        half = np.minimum(size / width / 2, MIDDLE)
+        _put(px, np.where(before, np.clip(px, half, 1 - half), px), held, f"{name}.px")
 
 
 HOUSE = ("width", "depth", "bcr")

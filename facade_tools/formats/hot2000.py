@@ -46,6 +46,7 @@ ONE_WALL_FOR_ALL = 4.0  # metres: a wall as high as this stands for all storeys 
 LONGEST_PLAN = 3.0  # length over width of a rectangular plan
 ROUNDEST, RAGGED = 0.98, 4.0  # of perimeter²/(16 area), which is 1 for a square
 LARGEST_JETTY = 1.25  # upper over main floor area; more stands above a garage
+LEAST_UPPER = SMALL_LEVEL**2  # … less than a level of `SMALL_LEVEL` holds: one floor was entered
 STOREYS = {
     "One storey": 1,
     "One and a half": 1,
@@ -207,7 +208,7 @@ def _upper_over_main(
     if not house.area_above:
         return None
     ratio = house.area_above / plan.area - 1.0
-    if not 0.0 < ratio <= LARGEST_JETTY:
+    if not LEAST_UPPER <= ratio <= LARGEST_JETTY:
         notes["upper floor area does not fit the main floor's: far and arf refused"] += 1
         return None
     return min(ratio, 1.0)

@@ -17,9 +17,10 @@ from facade_tools.geometry.checks import building_problems
 # --- designs ------------------------------------------------------------------------------------
 
 
-def test_design_takes_the_place_of_the_front_with_its_door(facade, tmp_path):
+@pytest.mark.parametrize("style", ["colonial", "ranch_l"])
+def test_design_takes_the_place_of_the_front_with_its_door(facade, tmp_path, style):
     mass = tmp_path / "mass.jsonl"
-    mass.write_bytes(dump_line(encode(bare(sample("colonial")))))
+    mass.write_bytes(dump_line(encode(bare(sample(style)))))
     design = ROOT / "sample_data" / "designs" / "house-front.yaml"
     out = tmp_path / "house.jsonl"
     done = facade("facadegen", mass, "--design", f"front:{design}", "-o", out)

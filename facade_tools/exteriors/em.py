@@ -32,10 +32,11 @@ class Prior:
 
     style, hidden, table: Dirichlet pseudo-counts, spread evenly over the states (hidden: over the
     group's own cluster shares). bit: Beta pseudo-counts, spread as the bit is over all rows: where
-    few rows know it, its styles would otherwise all move towards one half. mean: of cluster means around the overall mean. slope: of
-    lateral coefficients around 0. spread, freedom: Wishart on the precision with d + freedom
-    degrees; the covariance is expected near (d + freedom) · `spread` of the overall variance. With
-    lateral parents, overall means what the regression of all rows on them says (`Pooled`).
+    few rows know it, its styles would otherwise all move towards one half. mean: of cluster means
+    around the overall mean. slope: of lateral coefficients around 0. spread, freedom: Wishart on
+    the precision with d + freedom degrees; the covariance is expected near (d + freedom) · `spread`
+    of the overall variance. With lateral parents, overall means what the regression of all rows on
+    them says (`Pooled`).
     """
 
     style: float = 1.0

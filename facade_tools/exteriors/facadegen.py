@@ -223,7 +223,7 @@ class _Attempt:
     def _best(
         self, plain: SearchSide, doors: Sequence[MainDoor], targets: Floats
     ) -> tuple[Solution, int]:
-        """Return the best layout of a side over the walls of the first rank with room for the door."""
+        """Return the best layout of a side over the walls of the first rank that has room."""
         best, main, homeless = None, -1, True
         for _, rank in groupby(doors or [MainDoor()], key=lambda door: door.rank):
             for door in islice(rank, TRIES):

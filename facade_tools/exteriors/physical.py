@@ -94,9 +94,9 @@ def settle(
     """Move complete rows, in place, to what is possible.
 
     Ranges; r2 only above an r1; the garage inside the bounding box and not higher; porches on
-    their side of the middle, outside the garage, no wider than the house and open to one side; at a full rectangle,
-    exposures as places fix them (`full_plans`). fixed (n, d) a group: 1 where a value is given and
-    must stay.
+    their side of the middle, outside the garage, no wider than the house and open to one side; at
+    a full rectangle, exposures as places fix them (`full_plans`). fixed (n, d) a group: 1 where a
+    value is given and must stay.
     """
     _ranges(values, layout, fixed)
     no_second_floor(values, layout)

@@ -346,9 +346,10 @@ def _roof_bits(ceilings: tuple[str, ...]) -> dict[str, Bit]:
     """
     seen = {ROOF_OF_CEILING[ceiling] for ceiling in ceilings if ceiling in ROOF_OF_CEILING}
     rest = [ceiling for ceiling in ceilings if ceiling not in ROOF_OF_CEILING]
-    sloping = bool(ceilings) and all(ceiling in SLOPING for ceiling in rest)
-    told = {name: sloping and (not rest or name == "flat" or bool(seen - {"flat"})) for name in ROOF_BITS}
-    return {name: 1 if name in seen else 0 if told[name] else None for name in ROOF_BITS}
+    told: set[str] = set()
+    if ceilings and all(ceiling in SLOPING for ceiling in rest):
+        told = {"flat"} if rest and not seen - {"flat"} else set(ROOF_BITS)
+    return {name: 1 if name in seen else 0 if name in told else None for name in ROOF_BITS}
 
 
 def _styles(windows: tuple[Window, ...]) -> dict[str, Bit]:

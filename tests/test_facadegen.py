@@ -140,16 +140,21 @@ def test_garage_under_an_upper_storey_gets_a_door_beside_the_entrance():
     assert entrance[1].u + entrance[1].width < min(e.u for _, e in doors)
 
 
-def test_main_door_stands_behind_its_porch_whatever_symmetry_costs():
-    main = Box("main", "general", 6, 4, 12, 8, 2.8, Roof("hip"))
-    porch = Box("porch", "porch", 2, -0.75, 3, 1.5, 2.5, Roof("shed", 10, "y"))
-    mass = bare(replace(sample("bungalow"), boxes=(main, porch)))
-    facade = replace(mass.targets.facade, sym=(1.0, 1.0, 1.0, 1.0))
-    for seed in range(4):
-        (house,) = made(replace(mass, targets=replace(mass.targets, facade=facade)), seed)
-        (entrance,) = [e for _, _, e in elements(house) if e.main]
-        assert entrance.u > 0.5
-        assert entrance.u + entrance.width < 3.5
+@pytest.mark.parametrize("deeper", [0.0, 0.4])
+def test_main_door_stands_behind_the_porch_whatever_the_targets(deeper):
+    """Also where sampled measures put the porch at one end, or some way into the house."""
+    for number in range(4):
+        house, other = bare(sample("farmhouse", number)), bare(sample("farmhouse", number + 8))
+        porch = next(box for box in house.boxes if box.kind == "porch" and box.y < 0)
+        wall = next(
+            p for p in facade_pieces(house)["front"] if abs(porch.x - p.origin[0]) < p.width
+        )
+        narrow = replace(porch, x=wall.origin[0] + 1.5, y=porch.y + deeper, width=2.0)
+        boxes = tuple(narrow if box is porch else box for box in house.boxes)
+        (done,) = made(replace(house, boxes=boxes, targets=other.targets))
+        ((piece, door),) = [(piece, e) for _, piece, e in elements(done) if e.main]
+        middle = piece.origin[0] + door.u + door.width / 2
+        assert abs(middle - narrow.x) <= narrow.width / 2 - 0.5 + 1e-9
 
 
 def test_without_targets_the_library_gives_them():

@@ -168,8 +168,8 @@ def _porch_range(building: Building, piece: Piece) -> tuple[float, float] | None
     """Return where along a front piece a porch shelters the wall, half a metre in from its ends."""
     x, y = wall_of("front", piece).start
     for box in building.boxes:
-        touches = box.y - box.depth / 2 < y - 0.05 and box.y + box.depth / 2 > y - 0.05
-        if box.kind == "porch" and touches:
+        before = box.y - box.depth / 2 <= y - LEAST_PORCH and y < box.y + box.depth / 2 + 0.05
+        if box.kind == "porch" and before:
             low, high = box.x - box.width / 2 - x + 0.5, box.x + box.width / 2 - x - 0.5
             if low <= high and high > 0 and low < piece.width:
                 return low, high

@@ -12,11 +12,12 @@ from facade_tools.errors import Infeasible
 from facade_tools.grammar.library import builtin
 from facade_tools.grammar.reading import ReadOptions
 from facade_tools.imaging.image_io import Photo
+from facade_tools.imaging.rims import burnt_sky, rim
 from facade_tools.reconstruction.mrf import mrf_method
 from facade_tools.segmentation.classifier import default, save
 from facade_tools.segmentation.painting import render_facade
 from facade_tools.segmentation.parsing import forest_method
-from facade_tools.segmentation.second_opinion import WEIGHT, moved
+from facade_tools.segmentation.second_opinion import WEIGHT, exposed, moved
 
 CLASSES = ("window", "wall", "sky")
 WINDOW, WALL = LABELS.index("window"), LABELS.index("wall")
@@ -118,3 +119,58 @@ def test_both_take_metres(facade_here, picture):
     assert json.loads(done.stdout)["tags"]["scale"] == "height"
     assert "tags" not in json.loads(facade_here("parse-image", picture).stdout)
     assert facade_here("parse-image", picture, "--method", "forest", "--height", 18).returncode == 2
+
+
+# --- what shows no building -----------------------------------------------------------------------
+def rectified_street():
+    """A mid-grey picture: black to the right, burnt out on top and in a pane further down."""
+    picture = np.full((60, 80, 3), (150, 120, 90), np.uint8)
+    picture[:10] = 245
+    picture[30:40, 20:30] = 245
+    picture[:, 60:] = 0
+    return picture
+
+
+def test_burnt_sky_reaches_down_from_the_top():
+    picture = rectified_street()
+    outside = rim(picture)
+    assert outside[:, 62:].all()
+    assert not outside[:, :57].any()
+    sky = burnt_sky(picture, outside)
+    assert sky[:10, :57].all()
+    assert not sky[10:].any()
+
+
+def test_sky_below_what_lies_outside_is_sky():
+    picture = rectified_street()
+    picture[:5] = 128  # the rim's other colour
+    assert burnt_sky(picture, rim(picture))[8:10, :50].all()
+
+
+def test_nothing_stands_in_a_rim():
+    picture = rectified_street()
+    before = beliefs(0.5, 0.4, 0.1, picture.shape[:2])
+    after = exposed(before, CLASSES, picture)
+    np.testing.assert_allclose(after.sum(axis=0), 1, rtol=1e-5)
+    assert (after[0, :, 62:] < 0.1 * after[1, :, 62:]).all()
+    assert (after[2, :10, :57] > 0.9).all()
+    np.testing.assert_allclose(after[:, 12:, :57], before[:, 12:, :57], rtol=1e-6)
+
+
+def test_a_rim_gets_no_windows_and_a_classifier_asked_alone_is_not_told():
+    photo, _ = photo_of(3)
+    pixels = photo.pixels.copy()
+    height, width = pixels.shape[:2]
+    share = np.linspace(0.35, 0, height)[:, None]
+    wedge = np.arange(width) / width > 1 - share
+    pixels[wedge] = 0
+    photo = Photo("a.png", pixels, "0" * 64)
+    alone, beside = (
+        forest_method(ReadOptions(), second=second)(photo, "a", rng=np.random.default_rng(0))
+        for second in (None, mrf_method(ReadOptions()))
+    )
+    assert alone.parse.method == "forest"
+    inside = {r.method: (reading.labels[wedge] == WINDOW).mean() for reading in (alone, beside)
+              for r in [reading.parse]}  # fmt: skip
+    assert inside["both"] < 0.03
+    assert inside["both"] <= inside["forest"]

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from ..imaging.image_io import Picture
+from ..imaging.rims import rim
 
 Plane = NDArray[np.float32]  # (height, width)
 
@@ -54,19 +55,6 @@ def window_evidence(picture: Picture, hidden: NDArray[np.bool_] | None = None) -
     reach = REACH * len(picture)
     mean = _along_rows(raw, reach) / np.maximum(_along_rows(known, reach), 0.05)
     return Evidence(((raw - mean) * known).astype(np.float32), known)
-
-
-def rim(picture: Picture) -> NDArray[np.bool_]:
-    """Return where a rectified picture was filled up: flat black or mid-grey at its border."""
-    values = picture.astype(np.int16)
-    flat = (values.max(axis=2) < 14) | (np.abs(values - 128).max(axis=2) < 6)
-    count, marks, stats, _ = cv2.connectedComponentsWithStats(flat.astype(np.uint8), connectivity=4)
-    height, width = flat.shape
-    x, y, w, h, area = stats.T
-    outer = (x == 0) | (y == 0) | (x + w == width) | (y + h == height)
-    chosen = outer & (area > 0.004 * height * width) & (np.arange(count) > 0)
-    grown = cv2.dilate(chosen[marks].astype(np.uint8), np.ones((5, 5), np.uint8))
-    return grown > 0
 
 
 def _row_medians(lab: NDArray[np.float32], seen: NDArray[np.bool_]) -> NDArray[np.float32]:

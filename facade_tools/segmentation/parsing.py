@@ -28,7 +28,7 @@ from .classifier import load as load_classifier
 from .deriving import Frame, floors_of, regions_of, with_confidence
 from .energy import check_labels, field_of
 from .finishing import finished
-from .second_opinion import moved
+from .second_opinion import exposed, moved
 
 PLAIN = "plain"  # the shipped grammar of the fewest labels
 PROBE = 32  # pixels a side
@@ -118,6 +118,8 @@ def read_facade(
     other = _second_reading(reader.second, photo, identity, rng, mask)
     if other is not None:
         belief = moved(belief, reader.classifier.classes, other.labels)
+    if reader.second is not None:
+        belief = exposed(belief, reader.classifier.classes, working)
     hidden = _hidden(mask, working.shape[:2], shape)
     belief = np.where(hidden, np.float32(1), belief)
     field = field_of(belief, reader.classifier.classes, reader.plan)

@@ -82,6 +82,17 @@ def test_the_main_door_is_the_one_that_is_seen():
     assert door.u == pytest.approx(100 / 260 * building.boxes[0].width, abs=0.05)
 
 
+@pytest.mark.parametrize(("pixels", "known"), [(8, False), (24, True)])
+def test_a_door_seen_in_part_is_as_high_as_doors_are_and_a_fragment_is_none(pixels, known):
+    """A storey has 60 pixels: the fragments are 0.4 and 1.2 m high."""
+    labels = label_map(door=False)
+    labels[len(labels) - pixels :, 100:120] = INDEX["door"]
+    building = assemble("x", {"front": view_of_labels(labels)}, Assembly())
+    (door,) = [e for e in elements(building) if e.kind == "door"]
+    assert door.known == known
+    assert door.height == pytest.approx(2.1)
+
+
 def test_a_door_that_nobody_sees_is_a_guess():
     view = view_of_labels(label_map(door=False))
     (door,) = [e for e in elements(assemble("x", {"front": view}, Assembly())) if e.kind == "door"]

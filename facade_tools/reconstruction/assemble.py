@@ -36,6 +36,8 @@ STOREYS = (2.2, 6.0)  # m: storeys that a given height may have
 LEAST_DEPTH = 4.0  # m: of a building of which one side only is seen
 LEAST_OPENING = 0.25  # m: smaller ones are left out
 DOOR = (1.0, 2.1)  # m: a main door that nobody sees
+LEAST_DOOR = (0.6, 1.0)  # m: narrower, or with a lower head, it is a fragment and no door
+LOW_DOOR = 1.6  # m: whose head is lower was seen in part, and gets the usual height
 MARGIN = 0.02  # m between an opening and its piece's borders
 
 
@@ -209,6 +211,10 @@ def _openings(view: SideView, width: float, storey: float) -> list[_Opening]:
             ground, ceiling = view.lines[floor], view.lines[floor + 1]
             low, high = ((ground - y) / (ground - ceiling) * storey for y in (y1, y0))
             place = ((x0 - view.x0) * across, (x1 - view.x0) * across)
+            if kind == "door":
+                if place[1] - place[0] < LEAST_DOOR[0] or high < LEAST_DOOR[1]:
+                    continue
+                high = high if high >= LOW_DOOR else min(DOOR[1], 0.9 * storey)
             out.append(_Opening(kind, floor, *place, max(low, 0.0), min(high, storey)))
     return sorted(out, key=lambda o: (o.kind, -(o.right - o.left) * (o.high - o.low)))
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from facade_tools.artifacts.parse import Floor, ImageInfo, Parse, Region
+from facade_tools.artifacts.parse import LABELS, Floor, ImageInfo, Parse, Region
 from facade_tools.artifacts.store import read_one
 from facade_tools.errors import InvalidInput
 from facade_tools.formats import gltf
@@ -19,7 +19,12 @@ from facade_tools.reconstruction.elevation import building_lines, elevation, lab
 from facade_tools.reconstruction.engine import Lot
 from facade_tools.reconstruction.facets import faceted
 from facade_tools.reconstruction.reconstruct import Ask, reconstruct
-from facade_tools.reconstruction.surfaces import largest_rectangle, without_rim
+from facade_tools.reconstruction.surfaces import (
+    Canvas,
+    _exemplars,
+    largest_rectangle,
+    without_rim,
+)
 from facade_tools.reconstruction.texture_synthesis import cheapest_cut, joined, quilted
 from facade_tools.reconstruction.widening import widened
 
@@ -409,6 +414,18 @@ def test_dormers_at_the_picture_s_edge_show_the_photograph():
     edge = tuple(Region("window", x, 28, x + 12, 42) for x in (0, WIDTH - 12))
     made = reconstruct(parsed(regions=regions() + edge), picture(), rng=rng())
     assert {"glass", "trim"}.isdisjoint(mesh.material for mesh in made.scene().meshes)
+
+
+def test_exemplars_of_a_roof_hold_no_frames_of_its_dormers():
+    """White frames stand around every dormer and the sky looks in; both are labelled roof."""
+    slate = rng().normal((70, 80, 100), 6, (60, 200, 3)).clip(0, 255).astype(np.uint8)
+    slate[:6] = (170, 200, 240)
+    for x in range(20, 200, 45):
+        slate[20:44, x : x + 14] = 245
+    labels = np.full(slate.shape[:2], LABELS.index("roof"), np.uint8)
+    found = list(_exemplars(Canvas(slate, labels, (20.0, 20.0)), LABELS.index("roof")))
+    assert len(found) == 4
+    assert max(int(exemplar.max()) for exemplar in found) < 150
 
 
 def test_the_rim_of_a_rectified_picture_is_filled():

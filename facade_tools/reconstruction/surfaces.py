@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from ..artifacts.parse import LABELS
 from ..geometry.mesh import Material
 from ..imaging.image_io import Picture, encoded
+from ..imaging.rims import rim
 from .elevation import Elevation, Rect
-from .evidence import rim
 from .specific import FRONT, PHOTO, ROOF, SIDE, WALL, Axis
 from .texture_synthesis import joined, median_color, quilted
 
@@ -24,6 +24,11 @@ LEAST_BLOCK = 36  # pixels of a patch
 MOST_AXES = 4
 RIM = 0.012  # share of a picture's width beside its rim that the interpolation darkened
 SEAM = 0.12  # share of an axis' width in which its seam may run
+COARSE = 0.06  # metres over which colours are averaged where exemplars are sought
+ROUNDS = 4  # towards the colour that half of the pixels are nearest to
+UNUSUAL = 2.5  # median distances of that half from it: what is further away is no exemplar
+ALIKE = 1.0  # CIELAB units that nobody sees
+SAMPLE = 20_000  # pixels that tell that colour
 COLORS = {
     "wall": "#cdbf9f", "roof": "#6b727c", "chimney": "#97503e", "balcony": "#3a3c42",
     "door": "#5b4636", "shop": "#4a3e38", "window": "#3c4a58",
@@ -241,14 +246,35 @@ def _strip(canvas: Canvas, plan: Elevation, centre: float, width: float) -> Pict
 
 # --- tiles ----------------------------------------------------------------------------------------
 def _exemplars(canvas: Canvas, label: int) -> Iterator[Picture]:
-    """Yield the largest rectangles of one label, at most four."""
-    free = canvas.labels == label
+    """Yield the largest rectangles of one label and about one colour, at most four."""
+    free = _usual(canvas, canvas.labels == label)
     for _ in range(4):
         y0, x0, y1, x1 = largest_rectangle(free)
         if min(y1 - y0, x1 - x0) < 6:
             return
         yield np.asarray(canvas.picture[y0:y1, x0:x1])
         free[y0:y1, x0:x1] = False
+
+
+def _usual(canvas: Canvas, free: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return where pixels look like most of the `free` ones, coarsely: a dormer's frame does not.
+
+    What a parse calls roof or wall is edged by what it calls nothing, and may hold signs and sky.
+    """
+    if not free.any():
+        return free
+    lab = cv2.cvtColor(canvas.picture.astype(np.float32) / 255, cv2.COLOR_RGB2LAB)
+    colors = cv2.GaussianBlur(lab, (0, 0), max(1.0, COARSE * canvas.scale[0]))[free]
+    some = colors[:: max(1, len(colors) // SAMPLE)]
+    near = some
+    for _ in range(ROUNDS):
+        centre = np.median(near, axis=0)
+        away = np.linalg.norm(some - centre, axis=1)
+        near = some[away <= np.median(away)]
+    most = UNUSUAL * float(np.quantile(away, 0.25)) + ALIKE
+    out = np.zeros_like(free)
+    out[free] = np.linalg.norm(colors - centre, axis=1) <= most
+    return out
 
 
 def largest_rectangle(free: NDArray[np.bool_]) -> tuple[int, int, int, int]:

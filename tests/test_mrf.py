@@ -135,6 +135,13 @@ def test_a_picture_of_nothing_is_read_without_harm(pixels):
     assert_tiles(read(pixels).parse)
 
 
+@pytest.mark.parametrize("line", [slice(0, 0), slice(150, 151)])
+def test_hardly_any_evidence_is_no_endless_evidence(line):
+    pixels = np.full((400, 300, 3), 200, np.uint8)
+    pixels[:, line] = 90
+    assert abs(read(pixels).parse.energy) < 20
+
+
 @settings(deadline=None, max_examples=8)
 @given(st.integers(30, 400), st.integers(30, 400), st.integers(0, 99))
 def test_regions_always_tile(height, width, seed):

@@ -126,10 +126,12 @@ def repeated_columns(plane: Plane, storey: int) -> NDArray[np.float64]:
     """Return the profile of columns that comes again a storey above, and not half a storey above.
 
     storey: rows of the plane. So a drain, a pilaster or a neighbour's wall is no column of
-    windows. Has length 1 and is positive at windows. A plane of hardly more than a storey
-    repeats nothing; its leading profile is returned.
+    windows. Has length 1 (0 where the plane is blank) and is positive at windows. A plane of
+    hardly more than a storey repeats nothing; its leading profile is returned.
     """
     rows = _balanced(plane)
+    if not rows.any():
+        return np.zeros(rows.shape[1])
     n, half = len(rows), storey // 2
     if half < 1 or n < storey + half:
         return _leading(rows)

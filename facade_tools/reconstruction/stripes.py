@@ -27,6 +27,7 @@ STRIPE = (5, 30)  # cells: widths of a stripe, 0.5 to 3 m
 GAP = 60  # cells: the widest wall between two stripes
 WEIGHTS = Weights(alpha=3.0, beta=0.4, boundary=0.05, gap=0.03, content=0.2)
 EDGE = 0.15  # of the usual evidence: a stripe ends where it falls below
+FEW = 0.5  # of the columns' root mean square: the usual evidence is no less
 COST = 0.25  # of a stripe
 CELL_SHARE = 0.4  # of the usual evidence: from here a cell holds a window
 ROOF_BLUR = 2.0  # cells: a dormer's frame and its pane are one
@@ -42,7 +43,8 @@ def stripes(facade: Facade, *, gaps: bool = True) -> Chain:
     off. A facade without any has an empty chain.
     """
     across = repeated_columns(facade.plane[facade.sky :], facade.storey)
-    evidence = across / (np.percentile(across, 95) + 1e-9)
+    least = FEW * float(np.sqrt((across**2).mean()))  # where few columns hold anything, 95% is 0
+    evidence = across / (max(float(np.percentile(across, 95)), least) + 1e-9)
     return _chain(facade.picture[facade.sky :], evidence - EDGE, gaps=gaps)
 
 

@@ -174,3 +174,12 @@ def test_a_rim_gets_no_windows_and_a_classifier_asked_alone_is_not_told():
               for r in [reading.parse]}  # fmt: skip
     assert inside["both"] < 0.03
     assert inside["both"] <= inside["forest"]
+
+
+def test_shade_at_the_border_is_no_rim():
+    """What lies outside a photograph, a convex quadrilateral, holds a corner of the picture."""
+    picture = rectified_street()
+    picture[45:, 20:50] = 5  # the mouth of a shop
+    outside = rim(picture)
+    assert outside[:, 62:].all()
+    assert not outside[:, :57].any()

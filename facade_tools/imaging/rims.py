@@ -10,18 +10,25 @@ from .image_io import Picture
 
 Mask = NDArray[np.bool_]  # (height, width)
 
+CORNER = 0.01  # of the shorter side: so near to a corner compression and crops blur the fill
+LEAST = 0.004  # of the picture: what is smaller is no rim
 BURNT = 235  # of 255, the darkest channel of a sky that is burnt out
 
 
 def rim(picture: Picture) -> Mask:
-    """Return where a rectified picture was filled up: flat black or mid-grey at its border."""
+    """Return where a rectified picture was filled up: flat black or mid-grey from a corner on.
+
+    The photograph is a convex quadrilateral in it, so whatever lies outside holds a corner.
+    """
     values = picture.astype(np.int16)
     flat = (values.max(axis=2) < 14) | (np.abs(values - 128).max(axis=2) < 6)
-    count, marks, stats, _ = cv2.connectedComponentsWithStats(flat.astype(np.uint8), connectivity=4)
-    height, width = flat.shape
-    x, y, w, h, area = stats.T
-    outer = (x == 0) | (y == 0) | (x + w == width) | (y + h == height)
-    chosen = outer & (area > 0.004 * height * width) & (np.arange(count) > 0)
+    _, marks, stats, _ = cv2.connectedComponentsWithStats(flat.astype(np.uint8), connectivity=4)
+    near = max(2, round(CORNER * min(flat.shape)))
+    ends = slice(near), slice(-near, None)
+    corners = [marks[y, x].ravel() for y in ends for x in ends]
+    chosen = np.isin(np.arange(len(stats)), np.concatenate(corners))
+    chosen &= stats[:, cv2.CC_STAT_AREA] > LEAST * flat.size
+    chosen[0] = False
     grown = cv2.dilate(chosen[marks].astype(np.uint8), np.ones((5, 5), np.uint8))
     return grown > 0
 

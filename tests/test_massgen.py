@@ -134,6 +134,21 @@ def test_unknown_attributes_leave_the_search_free():
     assert kinds.count("porch") == 1
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_no_jog_or_gap_below_a_millimetre_meets_the_targets(seed):
+    """The exposure of this sampled front porch is that of one whose walls part by a hair."""
+    front = (0.412249731307, -0.113182091947, 7.18264351746, 1.9, 2.7, 0.616915487495)
+    back = (0.479173478943, 1.09615384615, 4.0, 2.0, 2.5, 0.166666666667)
+    mass = MassAttributes(
+        (13.4, 10.0, 6.2), 0.887277827124, 4.29203880193, 1.77455565425, (0.5, 0.5, 0.0),
+        (0.0,) * 6, (front, back),
+    )  # fmt: skip
+    wanted = targets("porches", roof={"hip": 1}, chimney=1)
+    (building,) = made(replace(wanted, id="5-246", mass=mass), seed)
+    lines = 1000 * box_rectangles(building.boxes)
+    assert np.abs(lines - np.rint(lines)).max() < 1e-5
+
+
 def test_contradictions_are_reported_not_fatal(caplog):
     vector = attribute_vector(targets("garage"))
     vector[4] = 2.0  # no plan has a perimeter under 4 √area

@@ -209,6 +209,10 @@ def test_locked_boxes_do_not_move():
     layout = layout_of(boxes, locked=True)
     layout.rows[1, 4] = 2.8
     assert gather(layout).values.tolist() == [2.8]
-    round_layout(layout, 0.5)
-    assert layout.rows[0].tolist() == [0, 0, 10, 8, 3]
-    assert layout.rows[1].tolist() == [9, 0, 13, 6, 3]
+    for lift, height in ((0.0, 3.0), (-0.5, 2.5), (0.5, 3.0)):
+        layout.rows[1, 4] = 2.8
+        round_layout(layout, 0.5, lift)
+        assert layout.rows[0].tolist() == [0, 0, 10, 8, 3]
+        assert layout.rows[1].tolist() == [9, 0, 13, 6, height]
+    round_layout(layout, 0.5, 0.5)
+    assert layout.rows[1, 4] == 3.0  # what is round already stays

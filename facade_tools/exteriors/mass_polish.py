@@ -262,9 +262,16 @@ def polish(layout: Layout, target: Target, work: Work) -> float:
 
 
 @compiled
-def round_layout(layout: Layout, digits_step: float) -> None:
-    """Round free lines and heights to multiples of `digits_step` (m), flush edges together."""
+def round_layout(layout: Layout, grain: float, lift: float) -> None:
+    """Round free lines and heights to multiples of `grain` (m), flush edges together.
+
+    lift: of heights before they are rounded, in grains: 0.5 takes them up, -0.5 down.
+    """
     variables = gather(layout)
+    lifts = np.zeros(len(variables.values))
+    for k in range(CAPACITY):
+        if variables.of[k, 4] >= 0:
+            lifts[variables.of[k, 4]] = lift * (1 - 1e-6)
     for v in range(len(variables.values)):
-        variables.values[v] = np.rint(variables.values[v] / digits_step) * digits_step
+        variables.values[v] = np.rint(variables.values[v] / grain + lifts[v]) * grain
     scatter(variables, variables.values, layout)

@@ -28,14 +28,15 @@ from .mass_roofs import (
     under_tower,
     with_tower,
 )
-from .mass_search import new_pool, pooled
+from .mass_search import new_pool, pooled, rank
 from .relations import states_storeys
 
 log = logging.getLogger("facade_tools.massgen")
 
 POOL = 48
-GRAIN = 1e-3  # generated positions and sizes are rounded to it (m) …
-ROUNDING = 1e-6  # … where that costs no more energy than this
+GRAIN = 1e-3  # generated positions and sizes are rounded to it (m)
+ROUNDING = 1e-6  # energy that rounding may cost without another try
+LIFTS = (0.0, 0.5, -0.5)  # heights near the threshold of a storey are rounded up, or down
 LEAST_WALL = 2.3  # of a general box where it changes no attribute (m)
 MET = 0.01  # a group whose relative residual is less counts as met
 
@@ -113,14 +114,29 @@ def find_masses(
         _raise_low_walls(layout, target.storey_height)
         if not known:
             move_to_origin(layout)
-        exact = _mass(layout, known, target, curve)
-        round_layout(layout, GRAIN)
-        rounded = _mass(layout, known, target, curve)
-        # A height a hair above a storey's threshold must not be rounded below it.
-        near = rounded.energy <= 1.5 * exact.energy + ROUNDING
-        found.append(rounded if near else exact)
-    chosen = [_with_porches(mass, keep, target) for mass in diverse(found, count)]
+        mass = _rounded(layout, known, target, curve)
+        found.append((rank(mass.energy, pool.taste[k]), mass))
+    ranked = [mass for _, mass in sorted(found, key=lambda row: row[0])]
+    chosen = [_with_porches(mass, keep, target) for mass in diverse(ranked, count)]
     return sorted(chosen, key=lambda mass: mass.energy)
+
+
+def _rounded(
+    layout: Layout, known: Sequence[Box], target: Target, curve: tuple[tuple[int, float], ...]
+) -> Mass:
+    """Return a layout's mass, rounded to the grain in the way that costs least.
+
+    What meets its targets by gaps and jogs below a millimetre loses them, and goes behind others.
+    """
+    near = 1.5 * _mass(layout, known, target, curve).energy + ROUNDING
+    tries = []
+    for lift in LIFTS:
+        trial = Layout(layout.rows.copy(), layout.kinds.copy(), layout.locks.copy())
+        round_layout(trial, GRAIN, lift)
+        tries.append(_mass(trial, known, target, curve))
+        if tries[-1].energy <= near:
+            break
+    return min(tries, key=lambda mass: mass.energy)
 
 
 def _with_porches(mass: Mass, keep: Building | None, target: Target) -> Mass:

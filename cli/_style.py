@@ -41,6 +41,7 @@ from facade_tools.stylization.resizing import resized
 from facade_tools.stylization.retarget import retarget
 from facade_tools.stylization.structure import chosen_style
 from facade_tools.stylization.style import Style
+from facade_tools.stylization.walling import roof_covers
 
 from ._export import write_files
 from ._items import each
@@ -133,7 +134,8 @@ class Dresser:
         if plain:
             blocks = with_ends(blocks, chosen.blocks)
         roofed = building is not None and not self.sizes
-        scene = retarget(chosen, blocks, self.small, flush=roofed)
+        covers = roof_covers(building) if building is not None and roofed else None
+        scene = retarget(chosen, blocks, self.small, flush=roofed, covers=covers)
         if building is not None and roofed:
             scene = crowned(scene, chosen, building)
         return base.id, scene, step

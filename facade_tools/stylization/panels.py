@@ -28,6 +28,7 @@ class Panel:
     corners (4, 3): lower left, lower right, upper right, upper left as seen from outside.
     source, target: width and height (m) before and after. rules: for columns and for rows.
     seen (k, 4): what of it is not hidden, as left, bottom, right, top in shares of the face.
+    shift (k,): how far beside each of them the part of the picture lies that it shows, in shares.
     """
 
     block: int
@@ -39,6 +40,7 @@ class Panel:
     target: tuple[float, float]
     rules: tuple[SplitRule, SplitRule]
     seen: Floats
+    shift: Floats
 
 
 def panels(
@@ -72,7 +74,7 @@ def panels(
                 used = (of_group[face.vertical], rows)
                 panel = _panel(index, side, corners, face, used)
                 if panel is not None and len(seen := _seen(panel, others)):
-                    found.append(replace(panel, seen=seen))
+                    found.append(replace(panel, seen=seen, shift=np.zeros(len(seen))))
     return found
 
 
@@ -108,7 +110,9 @@ def _panel(
     if min(target) <= TOUCH or min(source) <= 0:
         return None
     whole = np.array([[0.0, 0.0, 1.0, 1.0]])
-    return Panel(block, side, corners, face.texture, face.vertical, source, target, rules, whole)
+    return Panel(
+        block, side, corners, face.texture, face.vertical, source, target, rules, whole, np.zeros(1)
+    )
 
 
 def _seen(panel: Panel, others: Sequence[Slab]) -> Floats:

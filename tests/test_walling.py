@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -46,9 +46,8 @@ def windows(found):
     for k in (0, 1):
         done = split(resized_rule(found.rules[k], found.source[k]), found.target[k])
         ends = np.concatenate([[0.0], np.cumsum(done.sizes)]) / found.target[k]
-        spans.append([(a, b) for a, b in zip(ends[1::2], ends[2::2], strict=False)])
-        if not done.windows:
-            spans[-1] = []
+        pairs = zip(ends[:-1], ends[1:], done.sources, strict=True)
+        spans.append([(a, b) for a, b, source in pairs if source % 2 and done.windows])
     upright = [(1 - b, 1 - a) for a, b in spans[1]] or [(0.0, 1.0)]
     return np.array([(u[0], v[0], u[1], v[1]) for u in spans[0] for v in upright]).reshape(-1, 4)
 
@@ -104,6 +103,20 @@ def test_faces_without_walls_between_windows_stay():
     whole = panel()
     glass = Panel(*(getattr(whole, k) for k in NAMES[:7]), rules, whole.seen, whole.shift)
     assert walled(glass, [Cover("front", 4.0, (4, 0, 5, 6))]) is glass
+
+
+def test_sections_need_not_take_turns():
+    """A rule without a wall at its end, in a face that shows its first window only."""
+    rules = SplitRule((1.0, 1.0, 0.0), (2.0, 5.0)), RULES[1]
+    whole = panel()
+    ends = Panel(*(getattr(whole, k) for k in NAMES[:7]), rules, whole.seen, whole.shift)
+    for width in (3.0, 4.0, 7.0, 9.0, 12.0):
+        corners = whole.corners * (width / WIDTH, 1, 1)
+        done = walled(
+            replace(ends, corners=corners, target=(width, HEIGHT)),
+            [Cover("front", 4.0, (0, 0, width, 6))],
+        )
+        assert area(done.seen) == pytest.approx(1.0)
 
 
 @pytest.fixture(scope="module")

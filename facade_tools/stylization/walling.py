@@ -15,7 +15,7 @@ from ..geometry.blocked import porch_roofs, roof_rectangles, wall_of
 from ..geometry.pieces import facade_pieces
 from .panels import Panel, rectangles
 from .projection import SIDES
-from .splitting import SplitRule, split
+from .splitting import split
 from .stacking import FLUSH
 from .synthesis import resized_rule
 
@@ -23,6 +23,7 @@ NEAR = 0.3  # m: cornices and niches stand so far before or behind the wall that
 FRAME = 0.2  # of a wall between windows: frames, lintels and sills reach into its ends
 MOST_PIECES = 60  # of wall, in the place of one window
 Span = tuple[float, float]  # shares of a face
+Section = tuple[float, float, bool]  # and whether it is a window
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +64,9 @@ def walled(panel: Panel, covers: Sequence[Cover]) -> Panel:
     A window goes that a cover meets, or of which another block hides a part.
     """
     columns, rows = (_sections(panel, k) for k in (0, 1))
-    width = max((b - a for a, b in columns[::2]), default=0.0) * (1 - 2 * FRAME)
-    if len(columns) < 3 or width * MOST_PIECES < max(b - a for a, b in columns[1::2]):
+    openings = [b - a for a, b, is_window in columns if is_window]
+    wall = _plain(columns)
+    if not openings or (wall[1] - wall[0]) * MOST_PIECES < max(openings):
         return panel
     hidden = _hidden(panel, covers)
     cut = [
@@ -73,32 +75,39 @@ def walled(panel: Panel, covers: Sequence[Cover]) -> Panel:
         for v, high in _windows(rows) or [((0.0, 1.0), (0.0, 1.0))]
         if _is_cut((*u, *v), panel, hidden)
     ]
-    return _shown(panel, np.array(cut)[:, [0, 2, 1, 3]], _plain(columns)) if cut else panel
+    return _shown(panel, np.array(cut)[:, [0, 2, 1, 3]], wall) if cut else panel
 
 
-def _sections(panel: Panel, axis: int) -> list[Span]:
-    """Return the sections of a panel along an axis, walls and windows in turn, from 0 to 1."""
-    rule: SplitRule = resized_rule(panel.rules[axis], panel.source[axis])
+def _sections(panel: Panel, axis: int) -> list[Section]:
+    """Return the sections of a panel along an axis, from the left or the bottom."""
+    rule = resized_rule(panel.rules[axis], panel.source[axis])
     done = split(rule, panel.target[axis])
     if not done.windows:
-        return [(0.0, 1.0)]
+        return [(0.0, 1.0, False)]
     borders = np.concatenate([[0.0], np.cumsum(done.sizes)]) / panel.target[axis]
-    spans = list(pairwise(np.clip(borders, 0.0, 1.0).tolist()))
-    return spans if axis == 0 else [(1 - b, 1 - a) for a, b in reversed(spans)]
+    spans = pairwise(np.clip(borders, 0.0, 1.0).tolist())
+    found = [(a, b, k % 2 == 1) for (a, b), k in zip(spans, done.sources, strict=True)]
+    return found if axis == 0 else [(1 - b, 1 - a, k) for a, b, k in reversed(found)]
 
 
-def _windows(sections: Sequence[Span]) -> list[tuple[Span, Span]]:
+def _windows(sections: Sequence[Section]) -> list[tuple[Span, Span]]:
     """Return the windows among sections; and with what of their frames the walls show."""
     out = []
-    for k in range(1, len(sections), 2):
-        (a, before), (after, b) = sections[k - 1], sections[k + 1]
-        out.append((sections[k], (before - FRAME * (before - a), after + FRAME * (b - after))))
+    for k, (start, end, is_window) in enumerate(sections):
+        if is_window:
+            low, high = start, end
+            if k > 0 and not sections[k - 1][2]:
+                low -= FRAME * (start - sections[k - 1][0])
+            if k < len(sections) - 1 and not sections[k + 1][2]:
+                high += FRAME * (sections[k + 1][1] - end)
+            out.append(((start, end), (low, high)))
     return out
 
 
-def _plain(columns: Sequence[Span]) -> Span:
-    """Return the widest wall among columns without its ends."""
-    a, b = max(columns[::2], key=lambda span: span[1] - span[0])
+def _plain(columns: Sequence[Section]) -> Span:
+    """Return the widest wall among columns without its ends; nothing where there is no wall."""
+    walls = [(a, b) for a, b, is_window in columns if not is_window]
+    a, b = max(walls, key=lambda span: span[1] - span[0], default=(0.0, 0.0))
     return a + FRAME * (b - a), b - FRAME * (b - a)
 
 

@@ -353,6 +353,17 @@ def test_garage_under_the_house_wants_its_door_in_the_wall_of_the_house() -> Non
     assert "a garage door in box 'main', no garage" in [p.message for p in problems(wrong)]
 
 
+def test_garage_behind_an_observed_wall_wants_no_door() -> None:
+    """Known windows stand where a garage under the house ends: its door is where nobody saw it."""
+    inside = house(Box("garage", "garage", 7, 3, 4, 6, 2.6, Roof("flat")))
+    assert [p.pointer for p in problems(inside)] == ["/boxes/1"]
+
+    def seen(piece: Piece) -> Piece:
+        return replace(piece, elements=tuple(replace(e, known=True) for e in piece.elements))
+
+    assert problems(with_front(inside, seen)) == []
+
+
 def test_garage_behind_porches_wants_no_door() -> None:
     garage = Box("garage", "garage", 8, 3, 4, 6, 2.6, Roof("flat"))
     front = Box("porch", "porch", 8, -1, 4, 2, 2.5, Roof("flat"))

@@ -303,7 +303,12 @@ def _has_garage_wall(building: Building, roof: BuiltRoof, garage: Box) -> bool:
 
 
 def _takes_door(building: Building, roof: BuiltRoof, garage: Box, side: Side, piece: Piece) -> bool:
-    """Tell whether a piece has enough free wall of a garage that the garage needs a door."""
+    """Tell whether a piece has enough free wall of a garage that the garage needs a door.
+
+    A wall of which something was observed shows what there is: no door can be asked of it.
+    """
+    if any(element.known for element in piece.elements):
+        return False
     stretch = drive_stretch(building, garage, side, piece)
     if stretch is None or stretch[1] - stretch[0] < GARAGE_WALL[0] or piece.height < GARAGE_WALL[1]:
         return False

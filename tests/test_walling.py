@@ -10,16 +10,12 @@ import pytest
 
 from facade_tools.artifacts.building import Box, Building, Roof
 from facade_tools.artifacts.store import read
-from facade_tools.formats.mesh_reader import read_textured
 from facade_tools.stylization import retarget as module
 from facade_tools.stylization.bases import building_blocks
-from facade_tools.stylization.capture import capture_style
-from facade_tools.stylization.model import CaptureOptions
 from facade_tools.stylization.panels import Panel
 from facade_tools.stylization.projection import SIDES
 from facade_tools.stylization.retarget import retarget
 from facade_tools.stylization.splitting import SplitRule, split
-from facade_tools.stylization.style import Style
 from facade_tools.stylization.synthesis import resized_rule
 from facade_tools.stylization.walling import Cover, roof_covers, walled
 
@@ -119,16 +115,6 @@ def test_sections_need_not_take_turns():
         assert area(done.seen) == pytest.approx(1.0)
 
 
-@pytest.fixture(scope="module")
-def styles():
-    found = []
-    for name in ("corner-house", "l-block"):
-        model = read_textured(SAMPLES / "textured" / name / "model.obj")
-        capture = capture_style(model, name, CaptureOptions())
-        found.append(Style(capture.sheet, capture.blocks, capture.pictures))
-    return found
-
-
 WING = Building(
     "wing",
     (
@@ -152,7 +138,7 @@ def test_every_window_of_a_dressed_house_is_whole_or_gone(name, styles, monkeypa
 
     monkeypatch.setattr(module, "walled", kept)
     for house in houses:
-        for style in styles:
+        for style in (styles["corner-house"], styles["l-block"]):
             covers = roof_covers(house)
             retarget(style, building_blocks(house), flush=True, covers=covers)
     cut = 0

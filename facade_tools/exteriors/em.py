@@ -243,9 +243,14 @@ def step(
 
 def fit_bits(data: Dataset, weights: Weights, style: Floats, prior: Prior) -> Floats:
     """Return the MAP probability of each bit given S, (|S|, b)."""
-    one, zero = weights.bits * (data.bits == 1), weights.bits * (data.bits == 0)
+    one, zero = weighed_bits(data, weights)
     pseudo = bit_pseudo_counts(one, zero, prior)
     return beta_mode(style.T @ one, style.T @ zero, pseudo)
+
+
+def weighed_bits(data: Dataset, weights: Weights) -> tuple[Floats, Floats]:
+    """Return the weights (n, b) of the rows in which a bit is 1, and of those in which it is 0."""
+    return weights.bits * (data.bits == 1), weights.bits * (data.bits == 0)
 
 
 def bit_pseudo_counts(one: Floats, zero: Floats, prior: Prior) -> Floats:
@@ -284,8 +289,7 @@ def run(
     weights = weights or unit_weights(data)
     posterior = infer(network, data, weights)
     floor = floor or cluster_floors(network, data, weights, posterior)
-    one, zero = weights.bits * (data.bits == 1), weights.bits * (data.bits == 0)
-    pseudo = bit_pseudo_counts(one, zero, prior)
+    pseudo = bit_pseudo_counts(*weighed_bits(data, weights), prior)
     trace = [objective(network, posterior, weights, prior, pseudo)]
     for _ in range(stop.iterations):
         before = network

@@ -18,6 +18,7 @@ from .em import (
     posterior_moments,
     prior_precision,
     statistics,
+    weighed_bits,
     whole,
     wishart_scale,
 )
@@ -78,7 +79,7 @@ def family_part(stats: Statistics, family: Family, prior: Prior) -> float:
 
 def bits_part(data: Dataset, weights: Weights, style: Floats, p: Floats, prior: Prior) -> float:
     """Return marginal minus complete of the bits given S."""
-    one, zero = weights.bits * (data.bits == 1), weights.bits * (data.bits == 0)
+    one, zero = weighed_bits(data, weights)
     return beta_part(style.T @ one, style.T @ zero, p, bit_pseudo_counts(one, zero, prior))
 
 

@@ -11,7 +11,7 @@ from scipy.linalg import eigh
 from ..compiled import compiled
 from .coordinates import Bits, Floats
 from .dataset import Dataset
-from .em import NOTHING, Prior, beta_mode, bit_pseudo_counts, fit_table
+from .em import NOTHING, Prior, beta_mode, bit_pseudo_counts, fit_table, weighed_bits
 from .kernels_conjugate import fitted_tables
 from .network import Weights
 
@@ -127,7 +127,7 @@ class Rows:
 
 def rows_of(data: Dataset, weights: Weights, prior: Prior) -> Rows:
     """Return the fixed part of the rows."""
-    one, zero = weights.bits * (data.bits == 1), weights.bits * (data.bits == 0)
+    one, zero = weighed_bits(data, weights)
     return Rows(
         data.bits,
         one,

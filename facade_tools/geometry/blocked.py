@@ -6,7 +6,7 @@ All rectangles lie in a facade piece's frame: u to the right as seen from outsid
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -90,20 +90,6 @@ def blocked_walls(
     }
 
 
-def roof_rectangles(
-    building: Building, side: Side, pieces: Iterable[Piece]
-) -> Iterator[Rectangles]:
-    """Yield for each piece of a side what roofs hide of it (n, 4): u0, v0, u1, v1, metres.
-
-    Roofs of other boxes that meet the wall, without those of porches; see `blocked_rectangles`.
-    """
-    house = replace(building, boxes=tuple(b for b in building.boxes if b.kind != "porch"))
-    roof = BuiltRoof.of(house)
-    for piece in pieces:
-        rows = _roof_rows(house, roof, wall_of(side, piece), piece)
-        yield np.array(rows, dtype=np.float64).reshape(-1, 4)
-
-
 def porch_roofs(building: Building, side: Side, piece: Piece) -> Rectangles:
     """Return what the roofs of porches hide of a piece (n, 4): u0, v0, u1, v1, metres."""
     wall = wall_of(side, piece)
@@ -121,17 +107,11 @@ def blocked_rectangles(building: Building, roof: BuiltRoof, side: Side, piece: P
     piece, and overlap.
     """
     wall = wall_of(side, piece)
-    rows = _roof_rows(building, roof, wall, piece)
+    rows = [row for box in building.boxes for row in _roof_strips(box, wall, piece)]
+    rows += _buried_strips(roof, wall, piece, rows)
     porches = [box for box in building.boxes if box.kind == "porch"]
     rows += [row for porch in porches for row in _post_strips(building, porch, wall, piece)]
     return np.array(rows, dtype=np.float64).reshape(-1, 4)
-
-
-def _roof_rows(
-    building: Building, roof: BuiltRoof, wall: Wall, piece: Piece
-) -> list[tuple[float, ...]]:
-    rows = [row for box in building.boxes for row in _roof_strips(box, wall, piece)]
-    return [*rows, *_buried_strips(roof, wall, piece, rows)]
 
 
 def porch_strips(building: Building, porch: Box, side: Side, piece: Piece) -> Rectangles:

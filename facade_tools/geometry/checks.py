@@ -16,7 +16,7 @@ from ..artifacts.building import SIDES, Box, Building, Element, Piece, Side
 from .arrays import Booleans, Rectangles
 from .blocked import BuiltRoof, blocked_rectangles
 from .floors import TOLERANCE
-from .garage_walls import Stretch, drive_stretch, garage_stretch
+from .garage_walls import Stretch, drive_stretch, garage_stretch, stretch_of
 from .pieces import facade_pieces
 
 NEAR = 1e-4  # what is closer than this is in the same place (m)
@@ -119,18 +119,7 @@ def _piece_problems(building: Building) -> Iterator[Problem]:
 
 def _bears(box: Box, side: Side, piece: Piece) -> bool:
     """Tell whether a box is the one that a piece names and has a wall of that side there."""
-    along, across = (0, 1) if side in ("front", "back") else (1, 0)
-    centre, size = (box.x, box.y), (box.width, box.depth)
-    outward = 1 if side in ("back", "right") else -1
-    plane = centre[across] + outward * size[across] / 2
-    turned = -1 if side in ("back", "left") else 1  # u runs to the right as seen from outside
-    ends = sorted((piece.origin[along], piece.origin[along] + turned * piece.width))
-    low, high = centre[along] - size[along] / 2, centre[along] + size[along] / 2
-    return (
-        box.id == piece.box
-        and abs(plane - piece.origin[across]) <= NEAR
-        and min(ends[1], high) - max(ends[0], low) > NEAR
-    )
+    return box.id == piece.box and stretch_of(box, side, piece) is not None
 
 
 _Key = tuple[int, ...]

@@ -21,10 +21,15 @@ def garage_stretch(garage: Box, side: Side, piece: Piece) -> Stretch | None:
     (6.0, 10.0)
     >>> garage_stretch(garage, "left", Piece("left-1", "house", (0, 6, 0), 6, 3))
     """
+    return None if piece.origin[2] > NEAR else stretch_of(garage, side, piece)
+
+
+def stretch_of(box: Box, side: Side, piece: Piece) -> Stretch | None:
+    """Return the part of a piece on whose plane a box has its wall of that side, or None."""
     wall = wall_of(side, piece)
-    if piece.origin[2] > NEAR or abs(_extent(garage, wall, wall.outwards)[1]) > NEAR:
+    if abs(_extent(box, wall, wall.outwards)[1]) > NEAR:
         return None
-    low, high = _extent(garage, wall, wall.along)
+    low, high = _extent(box, wall, wall.along)
     low, high = max(low, 0.0), min(high, piece.width)
     return (low, high) if high - low > NEAR else None
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..artifacts.stylesheet import StyleBlock, StyleFace, StyleSheet
-from ..geometry.arrays import Booleans, Floats
+from ..geometry.arrays import Booleans, Floats, Rectangles
 from .placed import TOUCH, Placed, face_corners
 from .projection import SIDES
 from .remesh import Slab
@@ -122,26 +122,23 @@ def _seen(panel: Panel, others: Sequence[Slab]) -> Floats:
     bottom, top = panel.corners[0, 2], panel.corners[2, 2]
     low, high = sorted((float(left), float(right)))
     covers = [
-        (a, b, slab.bottom, slab.top)
+        (a, slab.bottom, b, slab.top)
         for slab in others
         if slab.bottom < top - TOUCH and slab.top > bottom + TOUCH
         for a, b in _stretches(slab, depth, place, low, high)
     ]
     if not covers:
         return panel.seen
-    lines = [sorted({low, high, *(v for a, b, _, _ in covers for v in (a, b) if low < v < high)})]
-    lines += [
-        sorted({bottom, top, *(v for _, _, a, b in covers for v in (a, b) if bottom < v < top)})
-    ]
-    us, vs = (np.array(line) for line in lines)
-    hidden = np.zeros((len(vs) - 1, len(us) - 1), dtype=bool)
-    u, v = 0.5 * (us[1:] + us[:-1]), 0.5 * (vs[1:] + vs[:-1])
-    for a, b, c, d in covers:
-        hidden |= ((v > c) & (v < d))[:, None] & ((u > a) & (u < b))[None]
+    boxes = np.array(covers)
+    us, vs = (
+        np.unique(np.clip([*ends, *boxes[:, k::2].ravel()], *ends))
+        for k, ends in enumerate(((low, high), (bottom, top)))
+    )
+    hidden = raster(boxes, us, vs)
     us = (us - left) / (right - left)
     vs = (vs - bottom) / (top - bottom)
-    boxes = [(us[a], vs[r], us[b], vs[q]) for r, q, a, b in rectangles(~hidden)]
-    seen = np.array(boxes).reshape(-1, 4)
+    open_ = [(us[a], vs[r], us[b], vs[q]) for r, q, a, b in rectangles(~hidden)]
+    seen = np.array(open_).reshape(-1, 4)
     return seen if right > left else seen[:, [2, 1, 0, 3]]
 
 
@@ -157,6 +154,15 @@ def _stretches(
     padded = np.concatenate([[False], line, [False]])
     for a, b in np.flatnonzero(padded[1:] != padded[:-1]).reshape(-1, 2):
         yield float(along[a]), float(along[b])
+
+
+def raster(boxes: Rectangles, us: Floats, vs: Floats) -> Booleans:
+    """Return which cells between lines (columns us, rows vs) lie in one of the boxes (k, 4)."""
+    u, v = 0.5 * (us[1:] + us[:-1]), 0.5 * (vs[1:] + vs[:-1])
+    out = np.zeros((len(v), len(u)), dtype=bool)
+    for a, b, c, d in boxes.tolist():
+        out |= ((v > b) & (v < d))[:, None] & ((u > a) & (u < c))[None]
+    return out
 
 
 def rectangles(mask: Booleans) -> Iterator[tuple[int, int, int, int]]:

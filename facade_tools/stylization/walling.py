@@ -10,10 +10,10 @@ from itertools import pairwise
 import numpy as np
 
 from ..artifacts.building import Building, Piece, Side
-from ..geometry.arrays import Booleans, Floats, Rectangles
-from ..geometry.blocked import porch_roofs, roof_rectangles, wall_of
+from ..geometry.arrays import Floats, Rectangles
+from ..geometry.blocked import blocked_walls, porch_roofs, wall_of
 from ..geometry.pieces import facade_pieces
-from .panels import Panel, rectangles
+from .panels import Panel, raster, rectangles
 from .projection import SIDES
 from .splitting import split
 from .stacking import FLUSH
@@ -43,9 +43,12 @@ class Cover:
 def roof_covers(building: Building) -> list[Cover]:
     """Return what the roofs of lower boxes and of porches hide of a building's walls."""
     covers: list[Cover] = []
-    for side, row in facade_pieces(building).items():
-        for piece, found in zip(row, roof_rectangles(building, side, row), strict=True):
-            covers += _covers(side, piece, found, False)
+    house = replace(building, boxes=tuple(b for b in building.boxes if b.kind != "porch"))
+    pieces = facade_pieces(building)
+    roofs = blocked_walls(house, pieces)
+    for side, row in pieces.items():
+        for piece in row:
+            covers += _covers(side, piece, roofs[piece.id], False)
             covers += _covers(side, piece, porch_roofs(building, side, piece), True)
     return covers
 
@@ -149,21 +152,13 @@ def _is_cut(cell: tuple[float, float, float, float], panel: Panel, hidden: Recta
 def _shown(panel: Panel, cut: Rectangles, wall: Span) -> Panel:
     """Return a panel that shows wall in the place of what is cut (k, 4)."""
     us, vs = (np.unique(np.concatenate([panel.seen[:, k::2], cut[:, k::2]])) for k in (0, 1))
-    seen, gone = _raster(panel.seen, us, vs), _raster(cut, us, vs)
+    seen, gone = raster(panel.seen, us, vs), raster(cut, us, vs)
     rows = [(us[a], vs[r], us[b], vs[q], 0.0) for r, q, a, b in rectangles(seen & ~gone)]
     for r, q, a, b in rectangles(seen & gone):
         for left, right, shift in _pieces(float(us[a]), float(us[b]), wall):
             rows.append((left, vs[r], right, vs[q], shift))
     found = np.array(rows, dtype=np.float64).reshape(-1, 5)
     return replace(panel, seen=found[:, :4], shift=found[:, 4])
-
-
-def _raster(boxes: Rectangles, us: Floats, vs: Floats) -> Booleans:
-    u, v = 0.5 * (us[1:] + us[:-1]), 0.5 * (vs[1:] + vs[:-1])
-    out = np.zeros((len(v), len(u)), dtype=bool)
-    for a, b, c, d in boxes.tolist():
-        out |= ((v > b) & (v < d))[:, None] & ((u > a) & (u < c))[None]
-    return out
 
 
 def _pieces(left: float, right: float, wall: Span) -> Iterator[tuple[float, float, float]]:

@@ -35,6 +35,7 @@ from facade_tools.stylization.bases import (
     with_ends,
 )
 from facade_tools.stylization.capture import capture_style
+from facade_tools.stylization.doors import door_covers
 from facade_tools.stylization.model import CaptureOptions
 from facade_tools.stylization.pitched import crowned
 from facade_tools.stylization.resizing import resized
@@ -134,7 +135,9 @@ class Dresser:
         if plain:
             blocks = with_ends(blocks, chosen.blocks)
         roofed = building is not None and not self.sizes
-        covers = roof_covers(building) if building is not None and roofed else None
+        covers = None
+        if building is not None and roofed:
+            covers = [*roof_covers(building), *door_covers(building)]
         scene = retarget(chosen, blocks, self.small, flush=roofed, covers=covers)
         if building is not None and roofed:
             scene = crowned(scene, chosen, building)

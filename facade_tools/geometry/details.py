@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..artifacts.building import SIDES, Building, Colors, Piece, Side
+from ..artifacts.building import SIDES, Building, Colors, Element, Piece, Side
 from ..artifacts.footprint import Footprint
 from .detail_boxes import Box6, LocalFrame, meshes_of, side_frame
 from .detail_cladding import cladding, corner_boards, wall_pattern
@@ -138,16 +138,19 @@ def _piece(name: str, side: Side, piece: Piece) -> Iterator[Mesh]:
     count: Counter[str] = Counter()
     for element in piece.elements:
         count[element.kind] += 1
-        part = f"{name}/{element.kind}-{count[element.kind]}"
-        if element.kind == "window" and element.style == "bay":
-            yield from bay_window(part, element, frame, 0.0)
-        elif element.kind == "window":
-            yield from meshes_of(part, window_parts(element), frame)
-        elif element.kind == "door":
-            yield from meshes_of(part, door_parts(element), frame)
-        else:
-            yield from meshes_of(part, garage_door_parts(element), frame)
+        yield from element_meshes(f"{name}/{element.kind}-{count[element.kind]}", element, frame)
     yield from _plinth(f"{name}/plinth", piece, frame)
+
+
+def element_meshes(name: str, element: Element, frame: LocalFrame) -> list[Mesh]:
+    """Return a window, door or garage door, one mesh a material; frame: of its piece."""
+    if element.kind == "window" and element.style == "bay":
+        return list(bay_window(name, element, frame, 0.0))
+    if element.kind == "window":
+        return meshes_of(name, window_parts(element), frame)
+    if element.kind == "door":
+        return meshes_of(name, door_parts(element), frame)
+    return meshes_of(name, garage_door_parts(element), frame)
 
 
 def _plinth(name: str, piece: Piece, frame: LocalFrame) -> list[Mesh]:

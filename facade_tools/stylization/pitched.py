@@ -19,6 +19,7 @@ from ..geometry.triangulate import newell_normal
 from ..imaging.image_io import Picture
 from .atlas import encoded_page
 from .bases import frame_of
+from .doors import door_meshes
 from .placed import TOUCH
 from .retarget import RAISED, framed
 from .splitting import SplitRule
@@ -36,7 +37,7 @@ Piece = tuple[Picture, tuple[float, float]]  # and its width and height, m
 
 
 def crowned(scene: Scene, style: Style, building: Building) -> Scene:
-    """Return a retargeted building under its own roofs, with its porches and chimneys.
+    """Return a retargeted building under its own roofs, with its doors, porches and chimneys.
 
     Roofs keep the building's colour; gables take a plain piece of the style's wall, mirrored so
     that it repeats without seams. A building of flat roofs alone keeps the style's roofs.
@@ -46,6 +47,7 @@ def crowned(scene: Scene, style: Style, building: Building) -> Scene:
     crown = crown_scene(building, solid if pitched else None)
     meshes, materials = list(crown.meshes), dict(crown.materials)
     walls, *bare = scene.meshes  # the mass comes first
+    meshes += door_meshes(building, [_unframed(mesh, building) for mesh in bare])
     walls = _under_roof(walls, building, solid) if pitched else _filled(walls)
     scene = replace(scene, meshes=(walls, *bare))
     if pitched:
@@ -57,6 +59,11 @@ def crowned(scene: Scene, style: Style, building: Building) -> Scene:
     kept = {f"own-{name}": replace(materials[name], name=f"own-{name}") for name in sorted(used)}
     own = [replace(m, material=f"own-{m.material}") for m in meshes if len(m.faces)]
     return replace(scene, meshes=(*scene.meshes, *own), materials={**scene.materials, **kept})
+
+
+def _unframed(mesh: Mesh, building: Building) -> Mesh:
+    frame = frame_of(building)
+    return mesh if frame is None else framed(mesh, np.linalg.inv(np.array(frame)).tolist())
 
 
 # --- the closed solid -----------------------------------------------------------------------------

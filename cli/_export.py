@@ -78,9 +78,7 @@ class Files:
 
 def run_export(stream: StreamOptions, form: str | None, arrange: str) -> None:
     """Write all items to the output that the options name."""
-    output = stream.output
-    if output is None:
-        raise click.UsageError("Missing option '-o': name a file or a folder.")
+    output = str(stream.output)
     if output == "-":
         _to_stdout(stream, form or "glb", arrange)
     elif _ending(output) is None and is_folder(output):

@@ -93,6 +93,18 @@ def _named(ctx: click.Context, param: click.Parameter, value: str | None) -> str
     return value
 
 
+def output_to(what: str) -> Callable[[F], F]:
+    """Return the option -o of a command that does not write without it; what it names."""
+
+    def given(ctx: click.Context, param: click.Parameter, value: str | None) -> str:
+        if value is None:
+            raise click.UsageError(f"Missing option '-o': name {what}.", ctx)
+        return str(_named(ctx, param, value))
+
+    help_text = f"Where to write: {what}."
+    return click.option("-o", "--output", metavar="PATH", callback=given, help=help_text)
+
+
 output = click.option(
     "-o",
     "--output",
@@ -141,11 +153,12 @@ mesh_unit = click.option(
 
 
 def stream_options(
-    metavar: str, *, seeded: bool = True, required: bool = True
+    metavar: str, *, seeded: bool = True, required: bool = True, to: str | None = None
 ) -> Callable[[F], Callable[..., Any]]:
     """All options of a stage that maps over a stream, gathered in one argument `stream`.
 
-    A stage that draws no random numbers is not `seeded`. Inputs may be `required`.
+    A stage that draws no random numbers is not `seeded`. Inputs may be `required`. to: what -o
+    names, of a stage that does not write without it.
     """
 
     def decorate(function: F) -> Callable[..., Any]:
@@ -159,7 +172,7 @@ def stream_options(
 
         options = [
             inputs(metavar, required),
-            output,
+            output if to is None else output_to(to),
             *([seed] if seeded else []),
             jobs,
             scheduler,

@@ -29,10 +29,8 @@ from ._stream import to_stdout
 LOG = logging.getLogger("facade_tools.rectify")
 
 
-def run_rectify(image: str, output: str | None, corners: str, report: str | None) -> None:
+def run_rectify(image: str, output: str, corners: str, report: str | None) -> None:
     """Read, rectify, write the picture and the report."""
-    if output is None:
-        raise click.UsageError("Missing option '-o': name a .png or .jpg file.")
     given = None if corners == "auto" else _corners(corners)
     refuse_overwriting([image], [output, report])
     photo = read_photo(image)

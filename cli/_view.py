@@ -87,9 +87,7 @@ class Drawing:
 
 def run_view(stream: StreamOptions, options: ViewOptions) -> None:
     """Draw all inputs to the output."""
-    output = stream.output
-    if output is None:
-        raise click.UsageError("Missing option '-o': name a .png or .html file.")
+    output = str(stream.output)
     ending = Path(output).suffix.lower()
     faults = Faults("view", stream.on_error)
     if ending in (".html", ".htm"):

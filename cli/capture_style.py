@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from ._options import FiniteRange, finite, mesh_unit, mesh_up, output
+from ._options import FiniteRange, finite, mesh_unit, mesh_up, output_to
 
 
 def _count(_: click.Context, parameter: click.Parameter, value: str) -> int | None:
@@ -24,7 +24,7 @@ def _azimuth(_: click.Context, parameter: click.Parameter, value: str) -> float 
 
 @click.command()
 @click.argument("model", metavar="MODEL")
-@output
+@output_to("the style sheet's folder")
 @click.option(
     "--front",
     default="auto",
@@ -54,7 +54,7 @@ def _azimuth(_: click.Context, parameter: click.Parameter, value: str) -> float 
 @mesh_unit
 def command(
     model: str,
-    output: str | None,
+    output: str,
     front: float | None,
     bottom: int | None,
     top: int | None,
@@ -75,7 +75,5 @@ def command(
 
     from ._style import run_capture
 
-    if output is None:
-        raise click.UsageError("Missing option '-o': name the style sheet's folder.")
     options = CaptureOptions(front, up, bottom, top, window_size, thickness)
     run_capture(model, output, options, unit)

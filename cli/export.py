@@ -10,7 +10,7 @@ FORMATS = {"glb": ".glb", "obj": ".obj", "cityjson": ".city.json"}
 
 
 @click.command()
-@stream_options("ITEM...", seeded=False)
+@stream_options("ITEM...", seeded=False, to="a file or a folder")
 @click.option(
     "--format",
     "form",

@@ -9,14 +9,14 @@ from . import _options
 
 @click.command()
 @click.argument("image", metavar="IMAGE")
-@_options.output
+@_options.output_to("a .png or .jpg file")
 @click.option(
     "--corners", default="auto", show_default=True, metavar="X,Y X,Y X,Y X,Y|auto",
     help="Corners of a rectangle on the facade in pixels: top left, top right, bottom right, "
     "bottom left. auto finds the directions from lines and keeps the whole picture.",
 )  # fmt: skip
 @click.option("--report", metavar="JSON", help="Homography, confidence and size.")
-def command(image: str, output: str | None, corners: str, report: str | None) -> None:
+def command(image: str, output: str, corners: str, report: str | None) -> None:
     """Turn a photograph of a facade straight.
 
     Refuses (exit code 3) pictures without enough lines in two directions. Standard error tells

@@ -13,7 +13,7 @@ from ._options import (
     mesh_unit,
     mesh_up,
     on_error,
-    output,
+    output_to,
     scheduler,
     seed,
 )
@@ -22,7 +22,7 @@ from ._options import (
 @click.command()
 @click.argument("style", metavar="STYLE_DIR")
 @click.argument("bases", nargs=-1, required=True, metavar="BASE...")
-@output
+@output_to("a .glb, an .obj or a folder")
 @click.option(
     "--styles",
     multiple=True,
@@ -53,7 +53,7 @@ from ._options import (
 def command(
     style: str,
     bases: tuple[str, ...],
-    output: str | None,
+    output: str,
     styles: tuple[str, ...],
     resize: tuple[str, ...],
     reassign: float,
@@ -74,8 +74,6 @@ def command(
     """
     from ._style import MeshOptions, is_style, run_retarget
 
-    if output is None:
-        raise click.UsageError("Missing option '-o': name a .glb, an .obj or a folder.")
     more = [base for base in bases if styles and is_style(base)]
     rest = [base for base in bases if base not in more]
     if not rest:

@@ -41,7 +41,7 @@ def _size(ctx: click.Context, param: click.Parameter, value: str | None) -> tupl
 
 
 @click.command()
-@stream_options("ARTIFACT...", seeded=False)
+@stream_options("ARTIFACT...", seeded=False, to="a .png or .html file")
 @click.option(
     "--azimuth", type=Finite(), default=-30.0, show_default=True,
     help="Where the viewer stands, degrees: 0 in front, 90 at the right side.",

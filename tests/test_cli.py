@@ -39,6 +39,24 @@ def test_help_and_version(facade):
         assert done.stdout
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("capture-style", "model.obj"),
+        ("export", "a.json"),
+        ("rectify", "photo.png"),
+        ("retarget", "style", "a.json"),
+        ("view", "a.json"),
+    ],
+)
+def test_help_does_not_promise_standard_output_to_stages_that_need_a_name(facade_here, words):
+    told = b" ".join(facade_here(words[0], "--help").stdout.split())
+    missing = facade_here(*words)
+    assert missing.returncode == 2
+    kinds = missing.stderr.strip().split(b"Missing option '-o': name ")[1]
+    assert b"Where to write: " + kinds in told
+
+
 def test_help_loads_no_stage_and_nothing_heavy():
     code = (
         "import sys; from facade_tools.cli.main import main; main(['--help'])\n"

@@ -13,7 +13,7 @@ from ..artifacts.documents import encode
 from ..artifacts.footprint import Footprint
 from ..artifacts.numbers import canonical
 from ..geometry.arrays import Points3
-from ..geometry.details import building_scene
+from ..geometry.details import crown_scene
 from ..geometry.mesh import Scene
 from ..geometry.openings import Opening, openings_of, pierced
 from ..geometry.solids import Solid, building_solid, footprint_solid
@@ -49,7 +49,7 @@ def building_model(building: Building) -> CityModel:
     table = _Table()
     open_solid, openings = pierced(solid, openings_of(building))
     geometry = [_lod2(solid, table), _lod3(open_solid, openings, table)]
-    installations = _installations(building_scene(building), building.id, table)
+    installations = _installations(crown_scene(building, None), building.id, table)
     attributes: dict[str, Any] = {
         "measuredHeight": round(float(solid.vertices[:, 2].max()), 3),
         "storeyHeight": float(building.storey_height),

@@ -68,9 +68,18 @@ def test_observed_side_cannot_be_designed():
         made(bare(house), keep=keep, designs={"front": door_design})
 
 
-def test_front_that_takes_no_main_door_is_reported(caplog):
+def test_main_door_goes_to_another_side_where_the_front_takes_none(caplog):
     thin = Building("thin", (Box("main", "general", 0.4, 4, 0.8, 8, 3, Roof("flat", 0, "x")),))
-    made(thin)
+    (house,) = made(thin)
+    assert [(side, e.kind) for side, _, e in elements(house) if e.main] == [("left", "door")]
+    assert list(building_problems(house)) == []
+    assert list(house.facades) == list(SIDES)
+    assert "no main door" not in caplog.text
+
+
+def test_house_that_takes_no_main_door_is_reported(caplog):
+    post = Building("post", (Box("main", "general", 0.4, 0.4, 0.8, 0.8, 3, Roof("flat", 0, "x")),))
+    made(post)
     assert "no main door" in caplog.text
 
 

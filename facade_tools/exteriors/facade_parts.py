@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..artifacts.building import Building, ElementKind, Piece
+from ..artifacts.building import Building, ElementKind, Piece, Side
 from ..artifacts.library import Library, LibraryBuilding, Part, PartSide
 from ..geometry.blocked import wall_of
 
@@ -140,12 +140,16 @@ def fitting_door(rows: Sequence[PartRow], front: Sequence[Piece]) -> list[PartRo
 
 
 def main_doors(
-    building: Building, pieces: Sequence[Piece], free: Sequence[bool], rows: Sequence[PartRow]
+    building: Building,
+    side: Side,
+    pieces: Sequence[Piece],
+    free: Sequence[bool],
+    rows: Sequence[PartRow],
 ) -> list[MainDoor]:
     """Return where the main door may be on a side, best first.
 
-    At ground level, in general boxes before garages, behind a porch before elsewhere (then
-    within the porch), in a wide wall before a narrow one.
+    At ground level, in general boxes before garages, in the front behind a porch before elsewhere
+    (then within the porch), in a wide wall before a narrow one.
     """
     sub, half = len(rows) - 1, rows[-1].width / 2 + BESIDE_DOOR
     kinds = {box.id: box.kind for box in building.boxes}
@@ -154,7 +158,7 @@ def main_doors(
         tall = piece.height >= rows[-1].height + OVER_DOOR - 1e-9
         if not free[p] or piece.origin[2] > 1e-6 or piece.width < 2 * half or not tall:
             continue
-        porch = _porch_range(building, piece)
+        porch = _porch_range(building, piece) if side == "front" else None
         low, high = half, piece.width - half
         garage = kinds[piece.box] != "general"
         found.append(MainDoor(p, low, high, sub, 0.3, (garage, True)))

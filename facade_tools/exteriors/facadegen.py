@@ -31,6 +31,9 @@ from .palette import house_colors
 
 log = logging.getLogger("facade_tools.facadegen")
 
+# The main door is in the front, or else in the first of the others that takes it.
+ENTRANCES: tuple[Side, ...] = ("front", "left", "right", "back")
+
 SIMILAR = 3  # buildings that may lend their elements, in random order
 TRIES = 3  # walls of one rank in which the main door is tried where the first does not do
 ENOUGH = 5e-3  # energy over its lower bound that needs no elements of another library building
@@ -86,7 +89,7 @@ def generate_facades(
         tries = (_Attempt(building, walls, shelf, entry, options, own) for entry in similar)
         done = replace(_first_good(attempt.finished(wanted) for attempt in tries), id=identity)
         if not _has_main_door(done):
-            log.warning("%s: no main door: no wall of the front is left that takes one", identity)
+            log.warning("%s: no main door: no wall is left that takes one", identity)
         yield done
 
 
@@ -178,15 +181,22 @@ class _Attempt:
         free = [piece for piece in front.pieces if piece.id not in front.closed]
         rows, codes = fitting_door(part_rows(library, self.entry), free), Codes()
         heads = storey_heads(self.building, sides, usual_heads(library, self.entry))
+        known = [e for side in sides for piece in side.pieces for e in piece.elements]
+        doorless = not any(e.main for e in known)
+        targets = side_targets(wanted)
         facades: dict[Side, Facade] = {}
         excess = 0.0
-        for standing, targets in zip(sides, side_targets(wanted), strict=True):
+        while len(facades) < len(SIDES):
+            order = ENTRANCES if doorless else SIDES
+            name = next(side for side in order if side not in facades)
+            standing = sides[SIDES.index(name)]
             plain = search_side_of(self.building, standing, rows, codes, heads, self.walls.blocked)
-            doors = self._main_doors(sides, standing, plain, rows)
-            found, main = self._best(plain, doors, targets)
+            doors = self._main_doors(standing, plain, rows) if doorless else []
+            found, main = self._best(plain, doors, targets[SIDES.index(name)])
+            doorless = doorless and main < 0
             facades[standing.name] = facade_of(standing, plain, found, codes, main)
             excess += found.energy - found.least
-        return facades, excess
+        return {side: facades[side] for side in SIDES}, excess
 
     def _standing(self, wanted: FacadeAttributes) -> list[Standing]:
         """Return the sides with known elements and garage doors."""
@@ -208,17 +218,10 @@ class _Attempt:
         return [_with_garage_doors(side, doors, garages) for side in sides]
 
     def _main_doors(
-        self,
-        sides: Sequence[Standing],
-        standing: Standing,
-        plain: SearchSide,
-        rows: Sequence[PartRow],
+        self, standing: Standing, plain: SearchSide, rows: Sequence[PartRow]
     ) -> list[MainDoor]:
-        given = any(e.main for side in sides for piece in side.pieces for e in piece.elements)
-        if given or standing.name != "front":
-            return []
         free = [bool(value) for value in plain.room[:, OPEN]]
-        return main_doors(self.building, standing.pieces, free, rows)
+        return main_doors(self.building, standing.name, standing.pieces, free, rows)
 
     def _best(
         self, plain: SearchSide, doors: Sequence[MainDoor], targets: Floats

@@ -246,13 +246,13 @@ def _door_problems(building: Building, roof: BuiltRoof, placed: list[_Placed]) -
             yield Problem("/facades", f"{len(mains)} main doors; expected exactly one")
         for item in mains:
             if not item.element.known and not _is_entrance(item):
-                yield Problem(item.pointer, "the main door is no door at ground level in the front")
+                yield Problem(item.pointer, "the main door is no door at ground level")
     yield from _garage_problems(building, roof, placed)
 
 
 def _is_entrance(item: _Placed) -> bool:
     ground = item.piece.origin[2] < NEAR and item.element.v <= STEP
-    return item.element.kind == "door" and item.side == "front" and ground
+    return item.element.kind == "door" and ground
 
 
 def _garage_problems(

@@ -37,5 +37,5 @@ def designers(pairs: Sequence[str]) -> dict[Side, SolvedWall]:
         if side is None or not path:
             expected = "expected SIDE:DESIGN with front, back, left or right"
             raise InvalidInput(f"--design {pair}: {expected}")
-        found[side] = SolvedWall(read_one(path, "design"))
+        found[side] = SolvedWall(read_one(path, Design))
     return found

@@ -81,7 +81,7 @@ def run_layer_solve(path: str, stream: StreamOptions, options: Mapping[str, Any]
 
 
 def _solver(path: str, item: RawItem, seed: int, options: Mapping[str, Any]) -> CanvasSolver:
-    design: Design = item.artifact("design")
+    design = item.artifact(Design)
     design = design if design.id else replace(design, id=_stem(path))
     recorded = {k: v for k, v in options.items() if k != "sheet" and v not in (None, False)}
     provenance = Provenance("layer-solve", seed, recorded, (item.provenance(),))

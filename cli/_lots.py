@@ -73,7 +73,7 @@ def _plot(artifact: Footprint | Building | RawItem | InvalidInput) -> Plot:
     if isinstance(artifact, InvalidInput):
         raise artifact
     if isinstance(artifact, RawItem):
-        return _plot(artifact.artifact("footprint", "building"))
+        return _plot(artifact.artifact(Footprint, Building))
     return _of_building(artifact) if isinstance(artifact, Building) else _of_footprint(artifact)
 
 
@@ -85,7 +85,7 @@ def artifacts_of(path: str, metres: bool) -> Iterator[Footprint | Building]:
     for record in _records(path, metres):
         if isinstance(record, InvalidInput):
             raise record
-        yield (record.artifact("footprint", "building") if isinstance(record, RawItem) else record)
+        yield (record.artifact(Footprint, Building) if isinstance(record, RawItem) else record)
 
 
 def _records(path: str, metres: bool) -> Iterator[Footprint | RawItem | InvalidInput]:

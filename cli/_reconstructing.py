@@ -51,7 +51,7 @@ class Maker:
     def __call__(self, task: Task) -> Made:
         """Return what is wanted of one parse; raises InvalidInput with its place."""
         item = task.item
-        parse: Parse = item.artifact("parse")
+        parse = item.artifact(Parse)
         photo = self._photo(item, parse)
         plot = task.plot
         lots = [] if plot is None else [Lot(rings, height) for rings, height in plot.lots]

@@ -246,7 +246,7 @@ def _base(source: Source, meshes: MeshOptions) -> tuple[Blocks, bool, Building |
     """Return a base, whether it may be given a bottom and a top, and the building it is of."""
     if isinstance(source, MeshFile):
         return mesh_blocks(meshes.read(source.path), source.id, meshes.up), True, None
-    artifact = source.artifact("blocks", "building", "layout")
+    artifact = source.artifact(Blocks, Building, Layout)
     if isinstance(artifact, Blocks):
         return artifact, False, None
     if isinstance(artifact, Layout):

@@ -19,11 +19,17 @@ from facade_tools.artifacts import store
 from facade_tools.artifacts.attributes import Attributes
 from facade_tools.artifacts.building import Box, Building, Element, Facade, Piece, Roof
 from facade_tools.artifacts.documents import KINDS, artifact_class, decode, encode, kind_of
+from facade_tools.artifacts.model import Model
 from facade_tools.artifacts.numbers import dump_line
 from facade_tools.artifacts.provenance import Provenance, Source
-from facade_tools.artifacts.store import read, read_all, read_one, read_raw
+from facade_tools.artifacts.store import read, read_one, read_raw
 from facade_tools.artifacts.validation import schema, schema_names
-from facade_tools.artifacts.writing import atomic_file, atomic_folder, write_artifact
+from facade_tools.artifacts.writing import (
+    atomic_file,
+    atomic_folder,
+    write_artifact,
+    write_artifacts,
+)
 from facade_tools.errors import InvalidInput, OutputFailed
 
 HOUSE = {
@@ -140,11 +146,12 @@ def test_mixed_inputs_come_in_order(tmp_path):
     )
     (tmp_path / "b" / ".hidden.json").write_text("no")
     (tmp_path / "a.jsonl").write_text(f"{json.dumps(house('0'))}\n\n{json.dumps(house('1'))}\n")
-    found = read([str(tmp_path / "a.jsonl"), str(tmp_path / "b")], "building")
-    assert [building.id for building in found] == ["0", "1", "2", "3"]
-    artifacts, sources = read_all([str(tmp_path / "a.jsonl"), str(tmp_path / "b")], "building")
-    assert len(artifacts) == 4
-    assert [source.name for source in sources] == ["a.jsonl", "b"]
+    for kind in ("building", Building):
+        found = read([tmp_path / "a.jsonl", str(tmp_path / "b")], kind)
+        assert [building.id for building in found] == ["0", "1", "2", "3"]
+    assert [building.id for building in read(tmp_path / "b", Building)] == ["2", "3"]
+    with pytest.raises(InvalidInput, match=r"a\.jsonl:1: /schema: .* facade-tools/model/1"):
+        next(read(tmp_path / "a.jsonl", Model))
 
 
 def _stdin(text: str) -> list:
@@ -233,6 +240,8 @@ def test_a_file_appears_whole_or_not_at_all(tmp_path):
     assert os.listdir(tmp_path) == ["out.json"]
     write_artifact(path, decode(HOUSE))
     assert json.loads(path.read_text())["id"] == "house"
+    write_artifacts(tmp_path / "two.jsonl", [decode(HOUSE)] * 2)
+    assert list(read(tmp_path / "two.jsonl", Building)) == [decode(HOUSE)] * 2
 
 
 def test_a_folder_appears_whole_or_not_at_all(tmp_path):

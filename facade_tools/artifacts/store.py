@@ -7,11 +7,15 @@ import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TypeVar, overload
 
 from ..errors import InvalidInput
-from .documents import check_finite, decode, parse_json, parse_yaml
+from .documents import Artifact, check_finite, decode, parse_json, parse_yaml
 from .provenance import Source
+
+A = TypeVar("A", bound=Artifact)
+Kind = str | type[Artifact]  # of an artifact: its name on disk, or its class
+Paths = str | Path | Iterable[str | Path]
 
 MAX_DOCUMENT_BYTES = 512 << 20
 MAX_LINE_BYTES = 64 << 20
@@ -43,11 +47,16 @@ class RawItem:
             return {"schema": f"facade-tools/{implied}/1", **document}
         return document
 
-    def artifact(self, *kinds: str) -> Any:
+    @overload
+    def artifact(self, kind: type[A], /) -> A: ...
+    @overload
+    def artifact(self, *kinds: Kind) -> Any: ...
+    def artifact(self, *kinds: Kind) -> Any:
         """Parse, check and decode; raises InvalidInput with file, line and pointer."""
-        document = self.document(kinds[0] if len(kinds) == 1 else None)
+        names = tuple(map(_kind_name, kinds))
+        document = self.document(names[0] if len(names) == 1 else None)
         try:
-            return decode(document, *kinds)
+            return decode(document, *names)
         except InvalidInput as error:
             raise error.at(self.source, self.line) from None
 
@@ -70,35 +79,36 @@ def read_raw(paths: Iterable[str], stdin: BinaryIO | None = None) -> Iterator[Ra
             yield from _read_file(Path(path), path)
 
 
-def read(paths: Iterable[str], *kinds: str) -> Iterator[Any]:
-    """Yield typed artifacts of the given kinds from files, folders and `-`."""
-    for item in read_raw(paths):
+@overload
+def read(paths: Paths, kind: type[A], /) -> Iterator[A]: ...
+@overload
+def read(paths: Paths, *kinds: Kind) -> Iterator[Any]: ...
+def read(paths: Paths, *kinds: Kind) -> Iterator[Any]:
+    """Yield the artifacts of the given kinds from one or many files, folders and `-`, in order.
+
+    Raises InvalidInput, with file, line and pointer, at the first that is no such artifact.
+    """
+    several = [paths] if isinstance(paths, str | Path) else paths
+    for item in read_raw(map(str, several)):
         yield item.artifact(*kinds)
 
 
-def read_one(path: str, *kinds: str) -> Any:
+@overload
+def read_one(path: str | Path, kind: type[A], /) -> A: ...
+@overload
+def read_one(path: str | Path, *kinds: Kind) -> Any: ...
+def read_one(path: str | Path, *kinds: Kind) -> Any:
     """Return the only artifact of `path`; raises InvalidInput if there is none or another."""
-    items = read(iter([path]), *kinds)
+    items = read(path, *kinds)
     first = next(items, None)
     if first is None or next(items, None) is not None:
         count = "none" if first is None else "several"
-        raise InvalidInput(f"holds {count}; expected one artifact").at(path)
+        raise InvalidInput(f"holds {count}; expected one artifact").at(str(path))
     return first
 
 
-def read_all(paths: Iterable[str], *kinds: str) -> tuple[list[Any], tuple[Source, ...]]:
-    """Return all artifacts of the inputs, and one provenance entry an input.
-
-    An input's digest is taken over the bytes of its items in order.
-    """
-    artifacts, sources = [], []
-    for path in paths:
-        running = hashlib.sha256()
-        for item in read_raw([path]):
-            running.update(item.data)
-            artifacts.append(item.artifact(*kinds))
-        sources.append(Source(_name(path), running.hexdigest()))
-    return artifacts, tuple(sources)
+def _kind_name(kind: Kind) -> str:
+    return kind if isinstance(kind, str) else kind.kind
 
 
 def read_whole(path: str, stdin: BinaryIO | None = None) -> RawItem:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
@@ -82,6 +82,13 @@ def write_artifact(path: Path, artifact: Artifact) -> None:
     document = encode(artifact)
     line = path.suffix.lower() == ".jsonl"
     write_bytes(path, dump_line(document) if line else dump_document(document))
+
+
+def write_artifacts(path: Path, artifacts: Iterable[Artifact]) -> None:
+    """Write artifacts as they come, one a line."""
+    with atomic_file(path) as file:
+        for artifact in artifacts:
+            file.write(dump_line(encode(artifact)))
 
 
 @contextmanager

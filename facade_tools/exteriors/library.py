@@ -95,7 +95,7 @@ def default_library() -> ElementLibrary:
 
 def read_library(path: str) -> ElementLibrary:
     """Return the library of a prepared `library.json`, or of buildings (.json, .jsonl, folder)."""
-    items = list(read([path], "library", "building"))
+    items = list(read(path, Library, Building))
     prepared = [item for item in items if isinstance(item, Library)]
     if prepared and len(items) > 1:
         raise InvalidInput("holds a library and more; expected one library, or buildings").at(path)

@@ -37,8 +37,8 @@ def read_style(folder: Path) -> tuple[StyleSheet, Blocks, dict[str, Picture]]:
     """
     if not folder.is_dir():
         raise InvalidInput("is no folder; expected a style sheet's").at(str(folder))
-    sheet: StyleSheet = read_one(str(folder / SHEET), "stylesheet")
-    blocks: Blocks = read_one(str(folder / BLOCKS), "blocks")
+    sheet = read_one(folder / SHEET, StyleSheet)
+    blocks = read_one(folder / BLOCKS, Blocks)
     names = {face.texture for wall in sheet.walls for face in wall.faces} | {sheet.roof}
     _check(folder, sheet, blocks)
     return sheet, blocks, {name: read_photo(str(folder / name)).pixels for name in sorted(names)}

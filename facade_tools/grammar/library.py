@@ -38,7 +38,7 @@ def load(name: str) -> Grammar:
     if not Path(name).exists():
         shipped = ", ".join(builtin_names())
         raise InvalidInput(f"is neither a file nor a shipped grammar ({shipped})").at(name)
-    grammar: Grammar = read_one(name, "grammar")
+    grammar = read_one(name, Grammar)
     try:
         check_grammar(grammar)
     except InvalidInput as error:

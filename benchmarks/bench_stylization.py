@@ -34,7 +34,6 @@ from facade_tools.imaging.image_io import decoded, encoded
 from facade_tools.stylization.capture import capture_style
 from facade_tools.stylization.columns import aligned_rules
 from facade_tools.stylization.framing import standard_view
-from facade_tools.stylization.model import CaptureOptions
 from facade_tools.stylization.projection import SIDES, Palette, _rasterise, palette
 from facade_tools.stylization.remesh import section
 from facade_tools.stylization.resizing import resized
@@ -213,10 +212,9 @@ def measure(path: Path) -> tuple[str, np.ndarray]:
     """Return a model's row of the table, and its pictures side by side."""
     mesh = read_textured(path)
     start = time.process_time()
-    capture = capture_style(mesh, path.parent.name, CaptureOptions())
+    style = capture_style(mesh, path.parent.name)
     captured = time.process_time()
-    style = Style(capture.sheet, capture.blocks, capture.pictures)
-    scene = retarget(style, capture.blocks)
+    scene = retarget(style, style.blocks)
     done = time.process_time()
     standard = standard_view(mesh)
     frame = np.linalg.inv(standard.frame)
@@ -240,8 +238,8 @@ def measure(path: Path) -> tuple[str, np.ndarray]:
     faces = sum(len(wall.faces) for wall in style.sheet.walls)
     kinds = counts(style)
     row = (
-        f"{path.parent.name[:34]:34} {len(mesh.faces):6} {len(capture.blocks.blocks):3} "
-        f"{faces:5} {capture.sheet.lost:5.0%} {kept[0]:6.3f} {kept[1]:6.3f} {likeness:6.3f}  "
+        f"{path.parent.name[:34]:34} {len(mesh.faces):6} {len(style.blocks.blocks):3} "
+        f"{faces:5} {style.sheet.lost:5.0%} {kept[0]:6.3f} {kept[1]:6.3f} {likeness:6.3f}  "
         f"{periods[0]:6.2f} {periods[1]:6.2f} {periods[2]:6.2f} {scale:6.2f}  "
         f"{kinds.width:5.1%} {kinds.packed:4.0%} {kinds.near:4.0%}  "
         f"{captured - start:5.2f} {done - captured:5.2f}"

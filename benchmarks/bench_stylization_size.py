@@ -17,9 +17,7 @@ import numpy as np
 from facade_tools.formats.mesh_reader import read_textured
 from facade_tools.formats.textured import TexturedMesh
 from facade_tools.stylization.capture import capture_style
-from facade_tools.stylization.model import CaptureOptions
 from facade_tools.stylization.retarget import retarget
-from facade_tools.stylization.style import Style
 
 
 def finer(mesh: TexturedMesh) -> TexturedMesh:
@@ -43,14 +41,14 @@ def main() -> None:
     parser.add_argument("--triangles", type=int, default=0)
     options = parser.parse_args()
     mesh = read_textured(options.model)
-    capture = capture_style(mesh, "warm", CaptureOptions())
-    retarget(Style(capture.sheet, capture.blocks, capture.pictures), capture.blocks)
+    style = capture_style(mesh, "warm")
+    retarget(style, style.blocks)
     while len(mesh.faces) < options.triangles:
         mesh = finer(mesh)
     start = time.process_time()
-    capture = capture_style(mesh, "large", CaptureOptions())
+    style = capture_style(mesh, "large")
     middle = time.process_time()
-    retarget(Style(capture.sheet, capture.blocks, capture.pictures), capture.blocks)
+    retarget(style, style.blocks)
     end = time.process_time()
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
     print(

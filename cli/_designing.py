@@ -22,10 +22,7 @@ class SolvedWall:
     def __call__(self, width: float, height: float) -> Sequence[Element]:
         """Return the windows and doors of the layout, in the frame of the wall."""
         layout = solve_design(self.design, width=width, height=height)
-        return [
-            Element(e.kind, e.style, e.u, e.v, e.width, e.height, e.main)  # type: ignore[arg-type]
-            for e in facade_elements(layout)
-        ]
+        return facade_elements(layout)
 
 
 def designers(pairs: Sequence[str]) -> dict[Side, SolvedWall]:

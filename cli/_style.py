@@ -75,7 +75,7 @@ def run_capture(model: str, output: str, options: CaptureOptions, unit: str) -> 
     """Read a model, capture its style and write the sheet's folder."""
     mesh = MeshOptions(options.up, unit).read(Path(model))
     try:
-        capture = capture_style(mesh, file_name(Path(model).parent.name or "model"), options)
+        style = capture_style(mesh, file_name(Path(model).parent.name or "model"), options)
     except InvalidInput as error:
         raise error.at(model) from None
     recorded = {
@@ -88,12 +88,12 @@ def run_capture(model: str, output: str, options: CaptureOptions, unit: str) -> 
         "unit": unit,
     }
     provenance = Provenance("capture-style", None, recorded, (digest(model),))
-    sheet = replace(capture.sheet, provenance=provenance)
-    blocks = replace(capture.blocks, provenance=provenance)
+    sheet = replace(style.sheet, provenance=provenance)
+    blocks = replace(style.blocks, provenance=provenance)
     for note in sheet.notes:
         log.warning("%s", note)
     with atomic_folder(Path(output)) as folder:
-        write_style(folder, sheet, blocks, capture.pictures)
+        write_style(folder, sheet, blocks, style.pictures)
 
 
 def is_style(path: str) -> bool:

@@ -74,11 +74,8 @@ def styles():
     """The styles of sample_data/textured by name."""
     from facade_tools.formats.mesh_reader import read_textured
     from facade_tools.stylization.capture import capture_style
-    from facade_tools.stylization.model import CaptureOptions
-    from facade_tools.stylization.style import Style
 
-    found = {}
-    for folder in sorted((ROOT / "sample_data" / "textured").iterdir()):
-        capture = capture_style(read_textured(folder / "model.obj"), folder.name, CaptureOptions())
-        found[folder.name] = Style(capture.sheet, capture.blocks, capture.pictures)
-    return found
+    return {
+        folder.name: capture_style(read_textured(folder / "model.obj"), folder.name)
+        for folder in sorted((ROOT / "sample_data" / "textured").iterdir())
+    }

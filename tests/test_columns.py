@@ -14,7 +14,6 @@ from facade_tools.stylization.bays import relief_bays
 from facade_tools.stylization.capture import capture_style
 from facade_tools.stylization.columns import aligned_rules, common_rule
 from facade_tools.stylization.groups import group_rule
-from facade_tools.stylization.model import CaptureOptions
 from facade_tools.stylization.outline import WallFace
 from facade_tools.stylization.projection import face_pictures
 from facade_tools.stylization.rhythm import regular_labels
@@ -48,7 +47,7 @@ def test_windows_out_of_line_keep_their_own_rules(a, b):
 
 def test_groups_in_line_share_a_rule_and_others_do_not():
     mesh = read_textured(SAMPLES / "corner-house" / "model.obj")
-    style = capture_style(mesh, "corner-house", CaptureOptions())
+    style = capture_style(mesh, "corner-house")
     rules = {rule.id: SplitRule(rule.a, rule.b) for rule in style.sheet.rules}
     known = {group.id: rules[group.rule] for group in style.sheet.groups}
     found = aligned_rules(style.sheet, style.blocks, style.pictures)

@@ -13,7 +13,6 @@ import trimesh
 from facade_tools.formats.mesh_reader import read_textured
 from facade_tools.formats.style_folder import write_style
 from facade_tools.stylization.capture import capture_style
-from facade_tools.stylization.model import CaptureOptions
 
 SAMPLES = Path(__file__).parent.parent / "sample_data" / "textured"
 
@@ -33,8 +32,8 @@ def base_file(path, identity="b", blocks=(BLOCK,), **more):
 def sheet(tmp_path_factory):
     folder = tmp_path_factory.mktemp("style")
     mesh = read_textured(SAMPLES / "l-block" / "model.obj")
-    capture = capture_style(mesh, "l-block", CaptureOptions())
-    write_style(folder, capture.sheet, capture.blocks, capture.pictures)
+    style = capture_style(mesh, "l-block")
+    write_style(folder, style.sheet, style.blocks, style.pictures)
     return folder
 
 

@@ -28,7 +28,6 @@ from facade_tools.stylization.retarget import retarget
 from facade_tools.stylization.roles import SeenTier, tier_roles
 from facade_tools.stylization.splitting import SplitRule
 from facade_tools.stylization.structure import chosen_style
-from facade_tools.stylization.style import Style
 from facade_tools.stylization.synthesis import synthesised
 
 WIDTH, DEPTH, HEIGHT = 20.0, 12.0, 15.0
@@ -80,8 +79,7 @@ def turned(mesh, degrees, shift=(0, 0, 0)):
 
 
 def style_of(mesh, **options):
-    capture = capture_style(mesh, "box", CaptureOptions(**options))
-    return Style(capture.sheet, capture.blocks, capture.pictures)
+    return capture_style(mesh, "box", CaptureOptions(**options))
 
 
 @settings(deadline=None, max_examples=25)

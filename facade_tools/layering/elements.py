@@ -3,28 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any
 
+from ..artifacts.building import Element
 from ..artifacts.layout import Layout, LayoutShape
 
 STYLES = ("sash", "sliding", "casement", "bay", "fixed")
 
 
-@dataclass(frozen=True, slots=True)
-class FacadeElement:
-    """An element in the piece's frame: lower left corner (u, v) and size, metres."""
-
-    kind: str
-    style: str
-    u: float
-    v: float
-    width: float
-    height: float
-    main: bool = False
-
-
-def facade_elements(layout: Layout) -> tuple[FacadeElement, ...]:
+def facade_elements(layout: Layout) -> tuple[Element, ...]:
     """Return the windows and doors among the visible shapes of a layout.
 
     A shape is one where its look says so (`element: {kind: window, style: sash}`), or where its
@@ -36,11 +24,11 @@ def facade_elements(layout: Layout) -> tuple[FacadeElement, ...]:
     return tuple(_one_main(found))
 
 
-def _made(shape: LayoutShape) -> Iterator[FacadeElement]:
+def _made(shape: LayoutShape) -> Iterator[Element]:
     words = dict(shape.element) if shape.element is not None else _named(shape)
     if words is not None:
-        yield FacadeElement(
-            str(words["kind"]),
+        yield Element(
+            words["kind"],
             str(words.get("style", "sash" if words["kind"] == "window" else "plain")),
             shape.x0,
             shape.y0,
@@ -60,11 +48,9 @@ def _named(shape: LayoutShape) -> dict[str, Any] | None:
     return None
 
 
-def _one_main(elements: list[FacadeElement]) -> Iterator[FacadeElement]:
+def _one_main(elements: list[Element]) -> Iterator[Element]:
     seen = False
     for element in elements:
         main = element.main and not seen
         seen = seen or main
-        yield FacadeElement(
-            element.kind, element.style, element.u, element.v, element.width, element.height, main
-        )
+        yield replace(element, main=main)

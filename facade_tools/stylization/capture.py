@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..artifacts.blocks import Blocks
 from ..artifacts.building import Side
 from ..artifacts.stylesheet import (
     Group,
@@ -28,29 +27,24 @@ from .outline import WallFace
 from .projection import SIDES, top_picture
 from .remesh import Slab, trimmed
 from .splitting import SplitRule, split_rule
+from .style import Style
 from .synthesis import resized_rule, synthesised
 
 WALL_SIDES: tuple[Side, ...] = ("front", "right", "back", "left")
 
 
-@dataclass(frozen=True, slots=True)
-class Capture:
-    """A style sheet, the model's own blocks, and the pictures by their file names."""
-
-    sheet: StyleSheet
-    blocks: Blocks
-    pictures: dict[str, Picture]
-
-
-def capture_style(mesh: TexturedMesh, identity: str, options: CaptureOptions) -> Capture:
-    """Capture the style of a model. Raises InvalidInput where it is no Manhattan building."""
+def capture_style(
+    mesh: TexturedMesh, identity: str, options: CaptureOptions | None = None
+) -> Style:
+    """Return the style of a model (m). Raises InvalidInput where it is no Manhattan building."""
+    options = options or CaptureOptions()
     model = modelled(mesh, identity, options)
     dressed = _dressed(model, options.window)
     pictures = {_file(i): picture for i, picture in enumerate(dressed.pictures)}
     low = np.min([part.low for part in model.parts], axis=0)[:2]
     high = np.max([part.high for part in model.parts], axis=0)[:2]
     pictures["textures/roof.png"] = top_picture(model.standard.mesh, low, high, model.density)
-    return Capture(_sheet(model, dressed, options.thickness), model.blocks, pictures)
+    return Style(_sheet(model, dressed, options.thickness), model.blocks, pictures)
 
 
 def _file(index: int) -> str:

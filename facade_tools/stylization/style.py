@@ -1,4 +1,4 @@
-"""What a retarget takes the look from."""
+"""A style: what a capture makes and what a retarget takes the look from."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .splitting import SplitRule
 
 @dataclass(frozen=True, slots=True)
 class Style:
-    """A style sheet with its pictures by file name, and the source's own blocks."""
+    """A style sheet, the source's own blocks, and the sheet's pictures by file name."""
 
     sheet: StyleSheet
     blocks: Blocks

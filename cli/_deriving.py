@@ -14,7 +14,7 @@ from facade_tools.errors import InvalidInput
 from facade_tools.randomness import item_generator
 from facade_tools.reconstruction.boxed import derived_building
 from facade_tools.reconstruction.drawing import derived_scene
-from facade_tools.reconstruction.engine import Lot, derive
+from facade_tools.reconstruction.engine import derive
 from facade_tools.reconstruction.expressions import number
 from facade_tools.reconstruction.library import Loaded, builtin_names, load
 from facade_tools.reconstruction.records import derivation_of
@@ -82,7 +82,7 @@ class Maker:
         """Return what is wanted of one building; raises InvalidInput with the rule's line."""
         plot = None if task.ground is None else task.ground.taken()
         grammar, rng = self.loaded.grammar, item_generator(self.seed, NAME, task.id)
-        lots = [] if plot is None else [Lot(rings, height) for rings, height in plot.lots]
+        lots = () if plot is None else plot.lots
         frame = None if plot is None else plot.frame
         building = scene = tree = None
         try:

@@ -15,11 +15,11 @@ from facade_tools.artifacts.store import RawItem, read_raw
 from facade_tools.errors import FacadeError, InvalidInput
 from facade_tools.imaging.image_io import Photo, read_photo
 from facade_tools.randomness import item_generator
-from facade_tools.reconstruction.engine import Lot
+from facade_tools.reconstruction.lots import Plot
 from facade_tools.reconstruction.reconstruct import Ask, reconstruct
 
 from ._items import each
-from ._lots import Plot, plots
+from ._lots import plots
 from ._models import Made, Wanted, wanted, write_models
 from ._options import StreamOptions, refuse_overwriting
 from ._stream import Faults, side_input
@@ -54,7 +54,7 @@ class Maker:
         parse = item.artifact(Parse)
         photo = self._photo(item, parse)
         plot = task.plot
-        lots = [] if plot is None else [Lot(rings, height) for rings, height in plot.lots]
+        lots = () if plot is None else plot.lots
         rng = item_generator(self.seed, NAME, parse.id)
         ask = self.ask
         if plot is not None and plot.roof is not None:

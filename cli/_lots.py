@@ -9,10 +9,10 @@ from pathlib import Path
 from facade_tools.artifacts.building import Building
 from facade_tools.artifacts.footprint import Footprint
 from facade_tools.artifacts.store import RawItem, read_raw
-from facade_tools.errors import InvalidInput, Place
-from facade_tools.formats.importing import items
+from facade_tools.errors import InvalidInput
+from facade_tools.formats.importing import built, items
 from facade_tools.formats.osm import states_height
-from facade_tools.formats.reading import BY_NAME, ReadOptions
+from facade_tools.formats.reading import ReadOptions
 from facade_tools.reconstruction.lots import Plot, plot_of
 
 GEOJSON = (".geojson", ".geojsonl")
@@ -80,29 +80,17 @@ def _records(path: str, metres: bool) -> Iterator[Footprint | RawItem | InvalidI
         return
     options = ReadOptions(kind="footprints", metres=metres)
     for item in items([path], options):
-        if item.error is not None or item.format is None or item.record is None:
-            yield item.error or InvalidInput("cannot be read").at(path)
-            continue
         try:
-            built = item.format.build(item.record, options).artifacts
+            found = built(item, options).artifacts
         except InvalidInput as error:
-            place = Place(path, item.record.line, item.record.pointer or error.place.pointer)
-            yield InvalidInput(error.message, place)
+            yield error
             continue
-        yield from (_stated(_named(row, path)) for row in built if isinstance(row, Footprint))
+        yield from (_stated(row) for row in found if isinstance(row, Footprint))
 
 
 def _stated(artifact: Footprint) -> Footprint:
     """Return a footprint of a map with the height 0 where the map states none."""
     return artifact if states_height(artifact.tags) else replace(artifact, height=0.0)
-
-
-def _named(artifact: Footprint, path: str) -> Footprint:
-    """Return a footprint that its file names, where it has no name of its own."""
-    if BY_NAME not in artifact.id[:1]:
-        return artifact
-    name = artifact.id.removeprefix(BY_NAME)
-    return replace(artifact, id=f"{Path(path).name.split('.')[0]}{name}")
 
 
 def _is_geojson(path: str) -> bool:

@@ -87,7 +87,7 @@ def test_an_id_that_stands_twice_is_refused(facade, tmp_path) -> None:
         (tmp_path / name).write_text(document)
     run = facade("import", tmp_path)
     assert run.returncode == 3
-    assert b"error: two: " in run.stderr
+    assert f"error: {tmp_path / 'two'}: ".encode() in run.stderr
     assert b"'h' stands twice" in run.stderr
 
 

@@ -19,7 +19,7 @@ from ..artifacts.provenance import Provenance, Source
 from ..artifacts.store import unreadable
 from ..errors import InvalidInput, Place
 from .detect import Format, detect
-from .reading import BY_NAME, HEAD_BYTES, Imported, ReadOptions, Record
+from .reading import BY_NAME, HEAD_BYTES, Built, Imported, ReadOptions, Record
 
 SPOOL_BYTES = 64 << 20  # of standard input in memory; what is longer waits on disk
 
@@ -28,8 +28,9 @@ KIND_OF = {"buildings": "building", "attributes": "attributes", "footprints": "f
 
 @dataclass(frozen=True, slots=True)
 class Item:
-    """A record, where it comes from, and its format; or the error of a file that has none."""
+    """A record of the file at `path`, and its format; or the error of a file that has none."""
 
+    path: str
     source: Source
     format: Format | None
     record: Record | None
@@ -46,6 +47,20 @@ class Written:
     notes: Counter[str] = field(default_factory=Counter)
 
 
+def imported(
+    paths: str | Path | Iterable[str | Path], options: ReadOptions | None = None
+) -> Iterator[Imported]:
+    """Yield what one or many files, or folders of them, of any public format give, in order.
+
+    Of rules that clipped or left out something nothing is told; `built` counts them. Raises
+    InvalidInput, with file, line and pointer, at the first record that cannot be read.
+    """
+    options = options or ReadOptions()
+    several = [paths] if isinstance(paths, str | Path) else paths
+    for item in items(map(str, several), options):
+        yield from built(item, options).artifacts
+
+
 def items(paths: Iterable[str], options: ReadOptions) -> Iterator[Item]:
     """Yield the records of files, folders and `-`, in order, in bounded memory.
 
@@ -53,12 +68,15 @@ def items(paths: Iterable[str], options: ReadOptions) -> Iterator[Item]:
     """
     for path in paths:
         for file in _files(path):
-            source = Source("-" if file == "-" else Path(file).name, "")
             try:
                 with _opened(file) as stream:
-                    yield from _records(stream, source, options)
+                    yield from _records(stream, file, options)
             except InvalidInput as error:
-                yield Item(source, None, None, error.at(file))
+                yield Item(file, Source(_name(file), ""), None, None, error.at(file))
+
+
+def _name(path: str) -> str:
+    return path if path == "-" else Path(path).name
 
 
 PROSE = (".md", ".txt", ".html", ".pdf")  # what tells about the data in the same folder
@@ -91,18 +109,18 @@ def _opened(path: str) -> Iterator[BinaryIO]:
         raise unreadable(path, error) from None
 
 
-def _records(stream: BinaryIO, source: Source, options: ReadOptions) -> Iterator[Item]:
+def _records(stream: BinaryIO, path: str, options: ReadOptions) -> Iterator[Item]:
     found = detect(stream.read(HEAD_BYTES))
     stream.seek(0)
     whole: Source | None = None
     for record in found.records(stream, options):
         if record.data is not None:
             digest = hashlib.sha256(record.data).hexdigest()
-            yield Item(replace(source, sha256=digest), found, record)
+            yield Item(path, Source(_name(path), digest), found, record)
             continue
         if whole is None:
-            whole = replace(source, sha256=_digest(stream))
-        yield Item(whole, found, record)
+            whole = Source(_name(path), _digest(stream))
+        yield Item(path, whole, found, record)
 
 
 def _digest(stream: BinaryIO) -> str:
@@ -114,6 +132,27 @@ def _digest(stream: BinaryIO) -> str:
         running.update(block)
     stream.seek(place)
     return running.hexdigest()
+
+
+def built(item: Item, options: ReadOptions) -> Built:
+    """Return what one record gives, named after its file where it has no name of its own.
+
+    Raises InvalidInput with file, line and pointer.
+    """
+    if item.error is not None or item.format is None or item.record is None:
+        raise item.error or InvalidInput("cannot be read").at(item.path)
+    try:
+        made = item.format.build(item.record, options)
+    except InvalidInput as error:
+        raise InvalidInput(error.message, _place(item, error.place.pointer)) from None
+    stem = item.source.name.split(".")[0] or "stdin"
+    return replace(made, artifacts=tuple(_identified(row, stem) for row in made.artifacts))
+
+
+def _place(item: Item, pointer: str = "") -> Place:
+    if item.record is None:
+        return Place(item.path)
+    return Place(item.path, item.record.line, item.record.pointer or pointer)
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,20 +169,14 @@ class Importer:
 
     def __call__(self, item: Item) -> Written:
         """Return the artifacts of `item`; raises InvalidInput with file, line and pointer."""
-        if item.error is not None or item.format is None or item.record is None:
-            raise item.error or InvalidInput("cannot be read")
-        record = item.record
+        made, place = built(item, self.options), _place(item)
         try:
-            built = item.format.build(record, self.options)
-            stem = Path(item.source.name).name.split(".")[0] or "stdin"
-            artifacts = [self._asked(_identified(row, stem)) for row in built.artifacts]
+            artifacts = [self._asked(artifact) for artifact in made.artifacts]
         except InvalidInput as error:
-            place = Place(item.source.name, record.line, record.pointer or error.place.pointer)
-            raise InvalidInput(error.message, place) from None
+            raise InvalidInput(error.message, _place(item, error.place.pointer)) from None
         provenance = Provenance("import", None, self.recorded, (item.source,))
         rows = [(a.id, dump_line(encode(replace(a, provenance=provenance)))) for a in artifacts]
-        place = Place(item.source.name, record.line, record.pointer)
-        return Written(tuple(rows), place, Counter(a.kind for a in artifacts), built.notes)
+        return Written(tuple(rows), place, Counter(a.kind for a in artifacts), made.notes)
 
     def _asked(self, artifact: Imported) -> Any:
         """Return what --as asks for; raises InvalidInput where the source does not give it."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -17,7 +16,7 @@ from facade_tools.artifacts.layout import Layout
 from facade_tools.artifacts.numbers import dump_document, dump_line
 from facade_tools.artifacts.provenance import Provenance
 from facade_tools.artifacts.store import RawItem, read_raw
-from facade_tools.errors import InvalidInput, Place
+from facade_tools.errors import InvalidInput
 from facade_tools.layering.assets import MEDIA, MESH, check_asset, named_assets
 from facade_tools.layering.solve import solve_design, variations
 from facade_tools.randomness import item_generator
@@ -74,7 +73,7 @@ def run_layer_solve(path: str, stream: StreamOptions, options: Mapping[str, Any]
         solver = replace(solver, sweep=len(canvases) > 1, indented=indented, drawn=drawn)
         write_items(solver, canvases, stream, faults)
     except InvalidInput as error:
-        raise _with_line(error, item) from None
+        raise item.located(error) from None
     if options["sheet"] and drawn:
         _write_sheet(str(options["sheet"]), drawn)
     faults.complain()
@@ -188,41 +187,6 @@ def _used(assets: Mapping[str, Any], layout: Layout) -> dict[str, Any]:
     """Return what visible shapes name, so that the layout stands on its own."""
     names = {n for s in layout.shapes if s.visible for n in (s.mesh, s.texture) if n}
     return {name: assets[name] for name in sorted(names)}
-
-
-def _with_line(error: InvalidInput, item: RawItem) -> InvalidInput:
-    """Add the line that the error's pointer leads to in hand-written YAML."""
-    line = error.place.line or _line_of(item, error.place.pointer)
-    place = Place(error.place.source or item.source, line, error.place.pointer)
-    message = error.message
-    unknown = re.search(r"\('([^']+)' (?:was|were) unexpected\)", message)
-    if unknown:
-        below = _line_of(item, f"{error.place.pointer.rstrip('/')}/{unknown.group(1)}")
-        place = replace(place, line=below or line)
-    return InvalidInput(message, place)
-
-
-def _line_of(item: RawItem, pointer: str) -> int | None:
-    import yaml
-
-    if not item.yaml or not pointer:
-        return None
-    try:
-        node: Any = yaml.compose(item.data, Loader=yaml.SafeLoader)
-    except (yaml.YAMLError, ValueError, RecursionError):
-        return None
-    line: int = node.start_mark.line + 1
-    for part in pointer.split("/")[1:]:
-        key = part.replace("~1", "/").replace("~0", "~")
-        if isinstance(node, yaml.MappingNode):
-            found = [(k, v) for k, v in node.value if str(k.value) == key]
-            if not found:
-                break
-            line, node = found[0][0].start_mark.line + 1, found[0][1]
-        elif isinstance(node, yaml.SequenceNode) and key.isdigit() and int(key) < len(node.value):
-            node = node.value[int(key)]
-            line = node.start_mark.line + 1
-    return line
 
 
 def _write_sheet(path: str, layouts: list[Layout]) -> None:

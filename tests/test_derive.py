@@ -427,4 +427,5 @@ def test_towers_of_too_many_pieces_are_refused_before_they_are_made():
 
 def test_lines_of_pointers():
     text = b"a:\n  - x: 1\n  - {y: 2}\nb: 3\n"
-    assert [line_of(text, p) for p in ("/a/0/x", "/a/1", "/b", "/a/7/z", "")] == [2, 3, 4, 2, 1]
+    places = ("/a", "/a/0/x", "/a/1", "/b", "/a/7/z", "")
+    assert [line_of(text, place) for place in places] == [1, 2, 3, 4, 1, 1]

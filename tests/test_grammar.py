@@ -316,6 +316,16 @@ def test_several_facades_do_not_go_into_one_json_file(facade_here, tmp_path):
     assert not out.exists()
 
 
+def test_rules_that_do_not_fit_are_named_with_their_line(facade_here, tmp_path):
+    path = tmp_path / "bad.yaml"
+    text = "id: bad\naxiom: A\nterminals: {a: wall}\nrules:\n  A: {split: up, into: a b}\n"
+    for bad, place in ((text, ":5: /rules/A/into: "), (f"{text}rulez: {{}}\n", ":6: /rulez: ")):
+        path.write_text(bad)
+        done = facade_here("sample-grammar", path)
+        assert (done.returncode, done.stdout) == (3, b"")
+        assert f"{path}{place}".encode() in done.stderr
+
+
 def test_unknown_grammars_are_named(facade):
     done = facade("sample-grammar", "nowhere.yaml")
     assert done.returncode == 3

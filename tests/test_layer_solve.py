@@ -171,7 +171,7 @@ def test_command(facade, tmp_path):
     ("old", "new", "code", "expected"),
     [
         ('"A(BA)^k"', '"A(BA^k"', 3, ":5: /patterns/Bx: pattern, line 1, column 7"),
-        ("opaque: false", "opak: false", 3, "'opak' was unexpected"),
+        ("opaque: false", "opak: false", 3, ":3: /symbols/C/opak: Additional properties"),
         ("counters: {k: auto}", "counters: {}", 3, "counter 'k'"),
         ("x: Cx", "x: Cy", 3, ":7: /layers/0/x: pattern 'Cy' does not exist"),
         ("width: 6", "width: 0.1", 4, "x (0.1 m): layer"),

@@ -180,7 +180,12 @@ def test_standard_input_holds_lines_or_one_document():
             json.dumps({**HOUSE, "boxes": [{**HOUSE["boxes"][0], "width": -1}]}),
             "/boxes/0/width: -1",
         ),
-        ("x.json", json.dumps({**HOUSE, "colour": 1}), "'colour' was unexpected"),
+        ("x.json", json.dumps({**HOUSE, "colour": 1}), "/colour: .*'colour' was unexpected"),
+        (
+            "x.yaml",
+            "id: a\nboxes:\n  - id: b\n    kind: general\n    dept: 3",
+            r"x\.yaml:3: /boxes/0: 'height'",
+        ),
         ("x.json", "[1]", "is a JSON list"),
     ],
 )

@@ -13,10 +13,10 @@ def escaped(key: str) -> str:
 
 
 def line_of(data: bytes, pointer: str) -> int | None:
-    """Return the line (from 1) of the value at a JSON pointer in YAML or JSON text.
+    """Return the line (from 1) of what a JSON pointer leads to in YAML or JSON text.
 
-    A pointer that leads nowhere gives the line of the last value on its way; text that cannot be
-    read gives None.
+    Of a value with a key it is the key's line. A pointer that leads nowhere gives the line of the
+    last value on its way; text that cannot be read gives None.
     """
     import yaml
 
@@ -26,22 +26,24 @@ def line_of(data: bytes, pointer: str) -> int | None:
         return None
     if node is None:
         return None
+    line = node.start_mark.line
     for part in pointer.strip("/").split("/") if pointer.strip("/") else []:
-        child = _child(node, part.replace("~1", "/").replace("~0", "~"))
-        if child is None:
+        key, node = _child(node, part.replace("~1", "/").replace("~0", "~"))
+        if node is None:
             break
-        node = child
-    return int(node.start_mark.line) + 1
+        line = key.start_mark.line
+    return int(line) + 1
 
 
-def _child(node: Any, part: str) -> Any:
+def _child(node: Any, part: str) -> tuple[Any, Any]:
+    """Return the node of a part's key (of an entry of a list, the entry) and of its value."""
     import yaml
 
     if isinstance(node, yaml.MappingNode):
-        return next((value for key, value in node.value if str(key.value) == part), None)
+        return next((row for row in node.value if str(row[0].value) == part), (None, None))
     if isinstance(node, yaml.SequenceNode) and part.isdigit() and int(part) < len(node.value):
-        return node.value[int(part)]
-    return None
+        return node.value[int(part)], node.value[int(part)]
+    return None, None
 
 
 def located(error: InvalidInput, data: bytes, source: str) -> InvalidInput:

@@ -11,6 +11,7 @@ from typing import Any, BinaryIO, TypeVar, overload
 
 from ..errors import InvalidInput
 from .documents import Artifact, check_finite, decode, parse_json, parse_yaml
+from .pointers import located
 from .provenance import Source
 
 A = TypeVar("A", bound=Artifact)
@@ -58,7 +59,13 @@ class RawItem:
         try:
             return decode(document, *names)
         except InvalidInput as error:
-            raise error.at(self.source, self.line) from None
+            raise self.located(error) from None
+
+    def located(self, error: InvalidInput) -> InvalidInput:
+        """Return an error with its file and line: of hand-written YAML, told by the pointer."""
+        if self.yaml:
+            return located(error, self.data, self.source)
+        return error.at(self.source, self.line)
 
     def provenance(self) -> Source:
         """Return name and digest of this item."""
@@ -99,11 +106,16 @@ def read_one(path: str | Path, kind: type[A], /) -> A: ...
 def read_one(path: str | Path, *kinds: Kind) -> Any: ...
 def read_one(path: str | Path, *kinds: Kind) -> Any:
     """Return the only artifact of `path`; raises InvalidInput if there is none or another."""
-    items = read(path, *kinds)
+    return read_only(str(path)).artifact(*kinds)
+
+
+def read_only(path: str) -> RawItem:
+    """Return the only item of `path`; raises InvalidInput if there is none or another."""
+    items = read_raw([path])
     first = next(items, None)
     if first is None or next(items, None) is not None:
         count = "none" if first is None else "several"
-        raise InvalidInput(f"holds {count}; expected one artifact").at(str(path))
+        raise InvalidInput(f"holds {count}; expected one artifact").at(path)
     return first
 
 

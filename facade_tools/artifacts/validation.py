@@ -12,6 +12,7 @@ import jsonschema_rs
 
 from ..errors import InvalidInput
 from .numbers import plain
+from .pointers import escaped
 
 if TYPE_CHECKING:
     from jsonschema.exceptions import ValidationError
@@ -96,8 +97,13 @@ def _explain(document: Any, kind: str) -> InvalidInput:
 
 
 def _pointer(error: ValidationError) -> str:
-    parts = (str(part).replace("~", "~0").replace("/", "~1") for part in error.absolute_path)
-    return "".join(f"/{part}" for part in parts) or "/"
+    """Return the pointer to what is wrong: of keys that no schema knows, to the first one."""
+    parts = [*map(str, error.absolute_path)]
+    if error.validator == "additionalProperties" and error.validator_value is False:
+        rules: Any = error.schema
+        document: Any = error.instance
+        parts += [key for key in document if key not in rules.get("properties", {})][:1]
+    return "".join(f"/{escaped(part)}" for part in parts) or "/"
 
 
 def _wording(error: ValidationError) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..artifacts.documents import decode, parse_yaml
 from ..artifacts.grammar import Grammar
-from ..artifacts.store import read_one
+from ..artifacts.store import read_only
 from ..errors import InvalidInput
 from .rules import check_grammar
 
@@ -38,9 +38,10 @@ def load(name: str) -> Grammar:
     if not Path(name).exists():
         shipped = ", ".join(builtin_names())
         raise InvalidInput(f"is neither a file nor a shipped grammar ({shipped})").at(name)
-    grammar = read_one(name, Grammar)
+    item = read_only(name)
+    grammar = item.artifact(Grammar)
     try:
         check_grammar(grammar)
     except InvalidInput as error:
-        raise error.at(name) from None
+        raise item.located(error) from None
     return grammar

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from math import inf
@@ -24,25 +24,12 @@ from facade_tools.formats.mesh_reader import ENDINGS, STATED, read_textured
 from facade_tools.formats.style_folder import read_style, write_style
 from facade_tools.formats.textured import TexturedMesh
 from facade_tools.geometry.arrays import Floats
-from facade_tools.geometry.mesh import Scene
 from facade_tools.randomness import item_generator
-from facade_tools.stylization.bases import (
-    brought_near,
-    building_blocks,
-    check_blocks,
-    layout_blocks,
-    mesh_blocks,
-    with_ends,
-)
+from facade_tools.stylization.bases import check_blocks, mesh_blocks
 from facade_tools.stylization.capture import capture_style
-from facade_tools.stylization.doors import door_covers
+from facade_tools.stylization.dressing import Base, Dressed, DressOptions, dressed
 from facade_tools.stylization.model import CaptureOptions
-from facade_tools.stylization.pitched import crowned
-from facade_tools.stylization.resizing import resized
-from facade_tools.stylization.retarget import retarget
-from facade_tools.stylization.structure import chosen_style
 from facade_tools.stylization.style import Style
-from facade_tools.stylization.walling import roof_covers
 
 from ._export import write_files
 from ._items import each
@@ -103,45 +90,26 @@ def is_style(path: str) -> bool:
 
 @dataclass(frozen=True)
 class Dresser:
-    """Makes the model of a base in one of the styles."""
+    """Makes the model of a base in one of the styles, in any process."""
 
     styles: Sequence[Style]
-    sizes: Mapping[str, tuple[float, float, float]]
-    small: float
+    options: DressOptions
     seed: int
     meshes: MeshOptions
 
-    def __call__(self, source: Source) -> tuple[str, Scene, Floats]:
-        """Return the base's id, its scene and how far that is from its place (3,), m.
+    def __call__(self, source: Source) -> tuple[str, Dressed]:
+        """Return the base's id and its model; raises InvalidInput with the place of what is wrong.
 
-        Raises InvalidInput with the place of what is wrong.
+        A mesh gets a bottom and a top as buildings do.
         """
         try:
-            return self.dressed(*_base(source, self.meshes))
+            base, options = _base(source, self.meshes), self.options
+            if isinstance(source, MeshFile):
+                options = replace(options, ends=True)
+            rng = item_generator(self.seed, "retarget", base.id)
+            return base.id, dressed(base, self.styles, options, rng=rng)
         except InvalidInput as error:
             raise error.at(*_place(source)) from None
-
-    def dressed(
-        self, base: Blocks, plain: bool, building: Building | None
-    ) -> tuple[str, Scene, Floats]:
-        """Return id, scene and the shift; plain: may the base be given a bottom and a top."""
-        check_blocks(base)
-        base, building, step = brought_near(base, building)
-        blocks = resized(base, self.sizes) if self.sizes else base
-        rng = item_generator(self.seed, "retarget", base.id)
-        chosen = self.styles[
-            chosen_style([s.sheet.blocks for s in self.styles], blocks.blocks, rng=rng)
-        ]
-        if plain:
-            blocks = with_ends(blocks, chosen.blocks)
-        roofed = building is not None and not self.sizes
-        covers = None
-        if building is not None and roofed:
-            covers = [*roof_covers(building), *door_covers(building)]
-        scene = retarget(chosen, blocks, self.small, flush=roofed, covers=covers)
-        if building is not None and roofed:
-            scene = crowned(scene, chosen, building)
-        return base.id, scene, step
 
 
 def run_retarget(
@@ -160,15 +128,15 @@ def run_retarget(
     if not is_folder(output):
         sources = _single(sources, output)
     sheets = [_style(Path(folder)) for folder in styles]
-    dresser = Dresser(sheets, sizes, small, stream.seed or 0, meshes)
+    dresser = Dresser(sheets, DressOptions(sizes, small), stream.seed or 0, meshes)
     faults = Faults("retarget", stream.on_error)
     seen: dict[str, str] = {}
     origin: Floats | None = None
-    for identity, scene, step in each(dresser, stream, faults, sources):
+    for identity, made in each(dresser, stream, faults, sources):
         name = faults.guard(new_file_name, identity, seen)
         if name is None:
             continue
-        scene, origin = near_origin(scene, step, origin)
+        scene, origin = near_origin(made.scene, made.shift, origin)
         folder, stem = (
             (Path(output), name) if is_folder(output) else (Path(output).parent, Path(output).stem)
         )
@@ -242,13 +210,8 @@ def _place(source: Source) -> tuple[str, int | None]:
     return source.source, source.line
 
 
-def _base(source: Source, meshes: MeshOptions) -> tuple[Blocks, bool, Building | None]:
-    """Return a base, whether it may be given a bottom and a top, and the building it is of."""
+def _base(source: Source, meshes: MeshOptions) -> Base:
     if isinstance(source, MeshFile):
-        return mesh_blocks(meshes.read(source.path), source.id, meshes.up), True, None
-    artifact = source.artifact(Blocks, Building, Layout)
-    if isinstance(artifact, Blocks):
-        return artifact, False, None
-    if isinstance(artifact, Layout):
-        return layout_blocks(artifact), True, None
-    return building_blocks(artifact), True, artifact
+        return mesh_blocks(meshes.read(source.path), source.id, meshes.up)
+    base: Base = source.artifact(Blocks, Building, Layout)
+    return base

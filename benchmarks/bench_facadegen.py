@@ -29,9 +29,9 @@ from facade_tools.artifacts.numbers import dump_line  # noqa: E402
 from facade_tools.artifacts.store import read_one  # noqa: E402
 from facade_tools.artifacts.writing import write_bytes  # noqa: E402
 from facade_tools.exteriors.attributes import building_attributes  # noqa: E402
-from facade_tools.exteriors.drawing import SampleOptions, sample_attributes  # noqa: E402
 from facade_tools.exteriors.facade_sizing import sized  # noqa: E402
 from facade_tools.exteriors.facadegen import FacadeOptions, generate_facades  # noqa: E402
+from facade_tools.exteriors.samples import SampleOptions, sample_attributes  # noqa: E402
 from facade_tools.geometry.checks import building_problems  # noqa: E402
 from facade_tools.geometry.pieces import facade_pieces  # noqa: E402
 from facade_tools.randomness import item_generator  # noqa: E402

@@ -16,10 +16,10 @@ import numpy as np
 from facade_tools.artifacts.attributes import Attributes, MassAttributes
 from facade_tools.exteriors import physical
 from facade_tools.exteriors.density import log_density
-from facade_tools.exteriors.drawing import SampleOptions, sample_attributes
 from facade_tools.exteriors.learning import LearnOptions, learn_model
 from facade_tools.exteriors.prior import shipped_prior
 from facade_tools.exteriors.sample_lines import sample_lines
+from facade_tools.exteriors.samples import SampleOptions, sample_attributes
 from facade_tools.exteriors.sampling import BLOCK, draw_block
 from facade_tools.exteriors.serialisation import network_of
 

@@ -30,10 +30,10 @@ from sklearn.model_selection import StratifiedKFold, cross_val_predict
 
 from facade_tools.artifacts.store import read
 from facade_tools.exteriors.coordinates import Readings, read_attributes
-from facade_tools.exteriors.drawing import SampleOptions, sample_attributes
 from facade_tools.exteriors.layout import Layout, building_layout
 from facade_tools.exteriors.learning import LearnOptions, learn_model
 from facade_tools.exteriors.prior import shipped_prior
+from facade_tools.exteriors.samples import SampleOptions, sample_attributes
 
 PEERS = {"products": lambda c: fit_products(c, np.random.default_rng(0)), "StepMix": fit_stepmix}
 

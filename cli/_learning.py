@@ -147,8 +147,8 @@ class Drawing:
 
     def __call__(self, run: tuple[int, int]) -> list[Lines]:
         """Return the samples of a run."""
-        from facade_tools.exteriors.drawing import SampleOptions
         from facade_tools.exteriors.sample_lines import sample_lines
+        from facade_tools.exteriors.samples import SampleOptions
         from facade_tools.randomness import item_generator
 
         start, count = run

@@ -18,7 +18,6 @@ from facade_tools.errors import InvalidInput
 from facade_tools.exteriors.coordinates import read_attributes, write_attributes
 from facade_tools.exteriors.dataset import build, fit_scaling
 from facade_tools.exteriors.density import log_density
-from facade_tools.exteriors.drawing import SampleOptions, sample_attributes
 from facade_tools.exteriors.evaluation import negative_log_density
 from facade_tools.exteriors.groups import GROUPS, Coordinate, Group, Reading, read_part, write_part
 from facade_tools.exteriors.kernels import gaussian
@@ -26,6 +25,7 @@ from facade_tools.exteriors.layout import building_layout
 from facade_tools.exteriors.learning import LearnOptions, learn_model
 from facade_tools.exteriors.network import infer
 from facade_tools.exteriors.prior import shipped_prior
+from facade_tools.exteriors.samples import SampleOptions, sample_attributes
 from facade_tools.exteriors.serialisation import groups_to_model, network_of
 from facade_tools.exteriors.transforms import TRANSFORMS, forward, inverse
 
@@ -43,7 +43,7 @@ sys.meta_path.insert(0, Block())
 import numpy as np
 from facade_tools.artifacts.codec import from_json
 from facade_tools.artifacts.model import Model
-from facade_tools.exteriors.drawing import sample_attributes
+from facade_tools.exteriors.samples import sample_attributes
 
 model = from_json(Model, json.load(open(sys.argv[1])))
 rows = sample_attributes(model, 4, rng=np.random.default_rng(7))

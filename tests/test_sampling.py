@@ -17,7 +17,6 @@ from facade_tools.artifacts.validation import check
 from facade_tools.errors import Infeasible, InvalidInput
 from facade_tools.exteriors.conditioning import draw_given
 from facade_tools.exteriors.coordinates import read_attributes
-from facade_tools.exteriors.drawing import SampleOptions, sample_attributes
 from facade_tools.exteriors.evaluation import negative_log_density
 from facade_tools.exteriors.learning import LearnOptions, learn_model
 from facade_tools.exteriors.physical import settle
@@ -25,6 +24,7 @@ from facade_tools.exteriors.prior import shipped_prior
 from facade_tools.exteriors.relations import contradictions
 from facade_tools.exteriors.row_bytes import Row, joined, text_column
 from facade_tools.exteriors.sample_lines import sample_lines
+from facade_tools.exteriors.samples import SampleOptions, sample_attributes
 from facade_tools.exteriors.sampling import draw_bits
 from facade_tools.exteriors.serialisation import network_of
 from facade_tools.exteriors.transforms import forward

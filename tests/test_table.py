@@ -11,9 +11,9 @@ import pytest
 
 from facade_tools.artifacts.store import read_whole
 from facade_tools.errors import InvalidInput
-from facade_tools.exteriors.drawing import SampleOptions
 from facade_tools.exteriors.learning import LearnOptions
 from facade_tools.exteriors.sample_lines import sample_lines
+from facade_tools.exteriors.samples import SampleOptions
 from facade_tools.exteriors.table import learn_table
 
 PLAIN = "a,b\n1,2\n3,4\n5,6\n2,2\n1,1\n"

@@ -13,9 +13,9 @@ from ..artifacts.building import Building
 from ..artifacts.model import Model
 from ..errors import Infeasible
 from .attributes import NAMES, attribute_vector, attributes_of_vector, building_attributes
-from .drawing import sample_attributes
 from .mass_attributes import GARAGE_AT
 from .mass_energy import GROUPS
+from .samples import sample_attributes
 
 log = logging.getLogger("facade_tools.massgen")
 

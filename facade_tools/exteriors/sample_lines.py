@@ -15,9 +15,9 @@ from ..artifacts.model import Model
 from ..artifacts.numbers import dump_line
 from ..artifacts.provenance import Provenance
 from .coordinates import columns_of
-from .drawing import Block, SampleOptions, Source, annotated, block_ids, source_of, taken_blocks
 from .physical import storey_heights
 from .row_bytes import Column, Row, joined, text_column
+from .samples import Block, SampleOptions, Source, annotated, block_ids, source_of, taken_blocks
 from .table_samples import table_rows
 
 SLOT = "\x00"  # stands in a template where a row puts its own text; JSON escapes it

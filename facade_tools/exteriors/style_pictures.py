@@ -13,9 +13,9 @@ from ..geometry.details import building_scene
 from ..imaging.camera import View
 from ..imaging.render import render
 from ..randomness import item_generator
-from .drawing import SampleOptions, sample_attributes
 from .facadegen import generate_facades
 from .massgen import generate_mass
+from .samples import SampleOptions, sample_attributes
 
 EACH = 2
 SIZE = (300, 225)  # pixels

@@ -8,8 +8,8 @@ from collections.abc import Iterable, Iterator
 from typing import Any
 
 from ..artifacts.numbers import canonical
-from .drawing import Block, Source, block_ids
 from .layout import Layout
+from .samples import Block, Source, block_ids
 from .table import columns_of
 from .table_groups import ID
 

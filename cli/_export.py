@@ -16,25 +16,12 @@ from facade_tools.artifacts.writing import write_bytes
 from facade_tools.errors import FacadeError, InvalidInput, OutputFailed
 from facade_tools.formats.exporting import ENDINGS, model_files, placed, vertex_count
 
-from ._items import each, load
+from ._items import each
 from ._options import StreamOptions
 from ._stream import Faults, file_name, is_folder, new_file_name, to_stdout
+from ._tables import CITY, SCENES, load
 
 MOST_VERTICES = 30_000_000  # in one file: about 2 GB of memory
-
-# Kind of artifact -> function that makes a Scene of it; what a GLB or OBJ shows.
-SCENES = {
-    "building": "facade_tools.geometry.details:building_scene",
-    "footprint": "facade_tools.geometry.details:footprint_scene",
-    "parse": "facade_tools.grammar.relief:parse_scene",
-    "layout": "facade_tools.layering.scene:layout_scene",
-    "derivation": "facade_tools.reconstruction.records:derivation_scene",
-}
-# Kind of artifact -> function that makes a CityModel of it.
-CITY = {
-    "building": "facade_tools.formats.city:building_model",
-    "footprint": "facade_tools.formats.city:footprint_model",
-}
 
 
 @dataclass(frozen=True)

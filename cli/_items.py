@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
-from importlib import import_module
 from typing import Any, TypeVar
 
 from facade_tools.artifacts.store import read_raw
@@ -15,13 +14,6 @@ from ._report import Progress
 from ._stream import Faults
 
 R = TypeVar("R")
-
-
-def load(target: str) -> Callable[..., Any]:
-    """Return the function that `module:name` names, importing it now."""
-    module, name = target.split(":")
-    function: Callable[..., Any] = getattr(import_module(module), name)
-    return function
 
 
 def each(

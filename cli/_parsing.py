@@ -26,7 +26,6 @@ from facade_tools.imaging.rectify import Rectification
 from facade_tools.parallel import map_ordered
 from facade_tools.randomness import item_generator
 
-from ._items import load
 from ._options import StreamOptions, refuse_overwriting
 from ._rectifying import check_rectification, rectification_of, tell_angle
 from ._report import Progress
@@ -40,7 +39,7 @@ from ._stream import (
     refuse_single,
     side_input,
 )
-from .parse_image import METHODS
+from ._tables import METHODS, load
 
 NAME = "parse-image"
 SOLVER = "dp"

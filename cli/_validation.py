@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable
 from contextlib import closing
-from importlib import import_module
 from typing import Any, NamedTuple
 
 import click
@@ -18,19 +17,7 @@ from facade_tools.parallel import map_ordered
 from ._options import StreamOptions
 from ._report import Progress
 from ._stream import is_single, open_sink
-
-# Kind of artifact -> function that yields its problems.
-RULES = {
-    "attributes": "facade_tools.exteriors.relations:contradictions",
-    "blocks": "facade_tools.stylization.bases:blocks_problems",
-    "building": "facade_tools.geometry.checks:building_problems",
-    "footprint": "facade_tools.geometry.checks_plan:footprint_problems",
-    "parse": "facade_tools.geometry.checks_plan:parse_problems",
-    "derivation": "facade_tools.reconstruction.records:derivation_problems",
-    "layout": "facade_tools.layering.assets:layout_problems",
-    "stylesheet": "facade_tools.formats.style_folder:sheet_problems",
-    "shape-grammar": "facade_tools.reconstruction.rules:grammar_problems",
-}
+from ._tables import RULES, load
 
 
 class Finding(NamedTuple):
@@ -94,6 +81,4 @@ def findings(item: RawItem) -> list[Finding]:
 def _rules(kind: str) -> Callable[[Any], Iterable[tuple[str, str]]]:
     if kind not in RULES:
         return lambda _: ()
-    module, name = RULES[kind].split(":")
-    rules: Callable[[Any], Iterable[tuple[str, str]]] = getattr(import_module(module), name)
-    return rules
+    return load(RULES[kind])

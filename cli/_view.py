@@ -23,10 +23,10 @@ from facade_tools.imaging.mass_views import mass_pictures
 from facade_tools.imaging.page import Exhibit, page
 from facade_tools.imaging.render import Picture, render
 
-from ._items import each, load
+from ._items import each
 from ._options import StreamOptions
 from ._stream import Faults, to_stdout
-from .view import DRAWINGS, WITH_FILES
+from ._tables import DRAWINGS, WITH_FILES, load
 
 MOST_PICTURES = 2000
 LARGEST_PAGE = 256 << 20  # bytes of the items of a page

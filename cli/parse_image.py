@@ -7,14 +7,7 @@ from typing import Any
 import click
 
 from ._options import FiniteRange, StreamOptions, stream_options
-
-# Method -> function(ReadOptions) that returns a Method (facade_tools.grammar.reading); it loads
-# when it is called for.
-METHODS = {
-    "both": f"{__package__}._parsing:both_methods",
-    "forest": "facade_tools.segmentation.parsing:forest_method",
-    "mrf": "facade_tools.reconstruction.mrf:mrf_method",
-}
+from ._tables import METHODS
 
 
 @click.command()

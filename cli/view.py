@@ -8,22 +8,6 @@ import click
 
 from ._options import Finite, FiniteRange, StreamOptions, stream_options
 
-# Kind of artifact -> function(artifact) that returns a Scene or an RGB picture (h, w, 3) uint8.
-# One line a kind; the function's module loads when an artifact of the kind is drawn.
-DRAWINGS = {
-    "building": "facade_tools.geometry.details:building_sketch",
-    "footprint": "facade_tools.geometry.details:footprint_scene",
-    "layout": "facade_tools.layering.drawing:layout_picture",
-    "attributes": "facade_tools.imaging.attribute_glyphs:attribute_glyph",
-    "model": "facade_tools.exteriors.picture:model_picture",
-    "blocks": "facade_tools.stylization.drawing:blocks_scene",
-    "stylesheet": "facade_tools.stylization.drawing:sheet_picture",
-    "parse": "facade_tools.imaging.label_views:parse_view",
-    "derivation": "facade_tools.reconstruction.records:derivation_scene",
-    "shape-grammar": "facade_tools.reconstruction.records:grammar_scene",
-}
-WITH_FILES = ("stylesheet",)  # their function takes the artifact's folder too
-
 MOST_PIXELS = 16_000_000
 
 

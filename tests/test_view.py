@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from test_export import FOOTPRINT, HOUSE, stream
 
-from facade_tools.cli.view import DRAWINGS
 from facade_tools.formats.gltf import write as write_glb
 from facade_tools.formats.meshes import read_scene
 from facade_tools.formats.png import write as write_png
@@ -304,14 +303,6 @@ def test_skip_draws_the_good_ones(facade_here, tmp_path, name):
     done = facade_here(*words, stdin=items)
     assert (done.returncode, out.exists()) == (3, True)
     assert b"1 bad items were skipped" in done.stderr
-
-
-def test_every_drawing_in_the_table_exists():
-    from facade_tools.artifacts.documents import KINDS
-    from facade_tools.cli._items import load
-
-    assert set(DRAWINGS) <= set(KINDS)
-    assert all(callable(load(target)) for target in DRAWINGS.values())
 
 
 # --- pages ----------------------------------------------------------------------------------------

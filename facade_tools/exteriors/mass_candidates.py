@@ -1,10 +1,10 @@
-"""Choosing candidates that differ."""
+"""Masses as candidates, and a choice of them that differ."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,11 +12,21 @@ from ..artifacts.building import Box
 from ..geometry.arrays import Rectangles
 from ..geometry.boxes import area_perimeter, box_rectangles
 
-if TYPE_CHECKING:
-    from .massgen import Mass
-
-LEAST_DISTANCE = 0.05
+LEAST_DISTANCE = 0.05  # of two masses (`mass_distance`)
 RELAXED = (LEAST_DISTANCE, 0.02, 0.005, 1e-4)
+
+
+@dataclass(frozen=True, slots=True)
+class Mass:
+    """Boxes of one mass, their energy, and its shares by attribute group.
+
+    curve: the search's (layouts polished, least energy) wherever that fell.
+    """
+
+    boxes: tuple[Box, ...]
+    energy: float
+    shares: dict[str, float]
+    curve: tuple[tuple[int, float], ...] = ()
 
 
 def mass_distance(a: Sequence[Box], b: Sequence[Box]) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from ..artifacts.model import Model
 from ..errors import Infeasible
 from .annealing import search
 from .mass_attributes import KINDS
-from .mass_candidates import diverse
+from .mass_candidates import Mass, diverse
 from .mass_energy import Target, layout_of, mass_energy, relative_residuals
 from .mass_hints import search_target
 from .mass_layout import EMPTY, GARAGE, GENERAL, Layout, move_to_origin
@@ -39,19 +39,6 @@ ROUNDING = 1e-6  # energy that rounding may cost without another try
 LIFTS = (0.0, 0.5, -0.5)  # heights near the threshold of a storey are rounded up, or down
 LEAST_WALL = 2.3  # of a general box where it changes no attribute (m)
 MET = 0.01  # a group whose relative residual is less counts as met
-
-
-@dataclass(frozen=True, slots=True)
-class Mass:
-    """Boxes of one mass, their energy, and its shares by attribute group.
-
-    curve: the search's (layouts polished, least energy) wherever that fell.
-    """
-
-    boxes: tuple[Box, ...]
-    energy: float
-    shares: dict[str, float]
-    curve: tuple[tuple[int, float], ...] = ()
 
 
 def generate_mass(

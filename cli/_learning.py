@@ -182,7 +182,7 @@ def write_samples(
             for lines in outcome.value or []:
                 for identity, data in lines.apart() if one_by_one(output) else [("", lines.data)]:
                     write(identity, data)
-                progress.advance(items=lines.count)
+                progress.advance(lines.count)
     progress.close()
 
 

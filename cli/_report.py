@@ -122,24 +122,18 @@ class Progress:
         self.enabled = sys.stderr.isatty() and not quiet
         self.drawn = False
 
-    def advance(self, fraction: float | None = None, *, items: int = 1) -> None:
-        """Count items that are done; `fraction` of all the work, where it is known."""
+    def advance(self, items: int = 1) -> None:
+        """Count items that are done."""
         check()
         self.count += items
         now = time.monotonic()
         if self.enabled and now - self.start > PATIENCE and now - self.shown > 0.1:
             self.shown, self.drawn = now, True
             rate = self.count / (now - self.start)
-            share = "" if fraction is None else f" {_bar(fraction)}"
-            text = f"facade {self.stage}:{share} {self.count} done, {rate:.3g} a second"
+            text = f"facade {self.stage}: {self.count} done, {rate:.3g} a second"
             click.echo(f"\r{text}\x1b[K", nl=False, err=True)
 
     def close(self) -> None:
         """Remove the line."""
         if self.drawn:
             click.echo("\r\x1b[K", nl=False, err=True)
-
-
-def _bar(fraction: float, width: int = 24) -> str:
-    full = round(width * min(max(fraction, 0.0), 1.0))
-    return f"[{'#' * full}{'.' * (width - full)}] {fraction:4.0%}"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from shapely import box as polygon_of
-from shapely.geometry import LineString, Polygon
 from shapely.ops import unary_union
 
 from facade_tools.artifacts.building import Box, Building
@@ -17,7 +16,6 @@ from facade_tools.geometry.boxes import (
     union_area_perimeter,
 )
 from facade_tools.geometry.floors import floor_boxes, floor_rectangles, storeys
-from facade_tools.geometry.outline import signed_area, union_rings
 
 
 def random_rectangles(rng, most=8):
@@ -44,19 +42,6 @@ def test_area_and_perimeter_equal_shapely(cases):
         assert perimeter == pytest.approx(union.length, abs=1e-9)
 
 
-def test_rings_are_the_simple_outline(cases):
-    for rectangles in cases:
-        union = unary_union([polygon_of(*r) for r in rounded(rectangles)])
-        rings = union_rings(rectangles)
-        for ring in rings:
-            assert Polygon(ring).is_valid
-            turns = np.diff(np.vstack([ring, ring[:2]]), axis=0)
-            assert ((turns[1:] != 0) != (turns[:-1] != 0)).all()
-        outline = unary_union([LineString(np.vstack([r, r[:1]])) for r in rings])
-        assert outline.symmetric_difference(union.boundary).length < 1e-9
-        assert sum(map(signed_area, rings)) == pytest.approx(union.area, abs=1e-9)
-
-
 def test_shared_outline_equals_shapely(cases):
     for rectangles in cases:
         edges = rounded(rectangles)
@@ -77,22 +62,13 @@ def test_edges_equal_after_rounding_are_shared():
     assert union_area_perimeter(np.array([[0, 0, 1, 1], [1.00001, 0, 2, 1]]))[1] > 7.9
 
 
-def test_nothing_has_no_area_and_no_ring():
+def test_nothing_has_no_area():
     assert union_area_perimeter(np.empty((0, 4))) == (0, 0)
-    assert union_rings(np.empty((0, 4))) == []
 
 
-def test_courtyard_is_a_clockwise_ring():
+def test_courtyards_have_a_perimeter_of_their_own():
     walls = np.array([[0, 0, 6, 1], [0, 5, 6, 6], [0, 0, 1, 6], [5, 0, 6, 6.0]])
-    outer, hole = union_rings(walls)
-    assert signed_area(outer) == 36
-    assert signed_area(hole) == -16
     assert union_area_perimeter(walls) == (20, 40)
-
-
-def test_boxes_that_touch_in_a_point_have_two_rings():
-    rings = union_rings(np.array([[0, 0, 1, 1], [1, 1, 2, 2.0]]))
-    assert [signed_area(ring) for ring in rings] == [1, 1]
 
 
 def test_floors_follow_the_half_storey_rule():

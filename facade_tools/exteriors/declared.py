@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from itertools import zip_longest
 
 from ..errors import InvalidInput
-from .groups import GROUPS, Group
+from .groups import GROUPS
 from .layout import GroupLayout, Layout, building_layout, merged
 
 
-def check_declared(layout: Layout, groups: tuple[Group, ...] = GROUPS) -> None:
+def check_declared(layout: Layout) -> None:
     """Raise InvalidInput, with the pointer, where it is over anything else than declared."""
-    declared = building_layout(layout.boundary, groups)
+    declared = building_layout(layout.boundary, GROUPS)
     if len(layout.groups) == 1:
         declared = merged(declared)
     _same([g.name for g in layout.groups], [g.name for g in declared.groups], "/groups", "/name")

@@ -16,23 +16,20 @@ from .conditioning import draw_given
 from .coordinates import Floats, Readings, read_attributes
 from .dataset import build
 from .density import entangled, log_density
-from .groups import GROUPS, Group
 from .network import Network
 from .serialisation import network_of
 
 DRAWS = 1000
 
 
-def negative_log_density(
-    model: Model, rows: Sequence[Attributes], groups: tuple[Group, ...] = GROUPS
-) -> Floats:
+def negative_log_density(model: Model, rows: Sequence[Attributes]) -> Floats:
     """Return −log p of each row (n,), nats, over what the row observes.
 
     Density per metre or per unit, probability mass at atoms (CONTRACT 3). Raises InvalidInput on
     a row with nothing observed.
     """
     network = network_of(model)
-    readings = read_attributes(rows, network.layout, groups)
+    readings = read_attributes(rows, network.layout)
     empty = np.flatnonzero(nothing_observed(readings))
     if len(empty):
         raise unseen(rows[empty[0]])

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from ..artifacts.attributes import FacadeAttributes
-from ..artifacts.building import SIDES, Facade
-from ..artifacts.building import Side as SideName
+from ..artifacts.building import SIDES
 from ..compiled import compiled
 from ..geometry.arrays import Floats, Integers
-from .facade_attributes import facade_vector, pack_facades, side_values, symmetric
+from .facade_attributes import side_values, symmetric
 from .facade_layout import (
     ABOVE,
     CENTRE,
@@ -52,14 +49,6 @@ def energy(reached: FacadeAttributes, wanted: FacadeAttributes) -> float:
             if value is not None and target is not None:
                 total += ((value - target) / max(target, LEAST_TARGET)) ** 2
     return total
-
-
-def facade_energy(facades: Mapping[SideName, Facade], wanted: FacadeAttributes) -> float:
-    """Return eq. 4 of finished facades."""
-    packed = pack_facades(facades)
-    row = facade_vector(packed.pieces, packed.elements)
-    values = tuple(None if np.isnan(value) else float(value) for value in row)
-    return energy(FacadeAttributes(values[:4], values[4:8], values[8:]), wanted)
 
 
 def side_targets(wanted: FacadeAttributes | None) -> Floats:

@@ -21,6 +21,7 @@ from .styles import longest
 
 CANDIDATES = 3  # clusters that are tried for a split
 TRIAL = 4  # iterations of each trial
+ROUNDS = 60  # at most, with one cluster more or less
 CLEAR = 3.0  # standard errors from which a pooled slope counts
 LEAST_ROWS = 2.0  # a cluster lighter than this is not split
 
@@ -129,7 +130,7 @@ def single(task: Task, inputs: tuple[int, ...] = (), *, tied: bool = False) -> L
     return improve(task, evaluate(task, family), 20)
 
 
-def grow(task: Task, fit: Local, iterations: int = 60) -> Local:
+def grow(task: Task, fit: Local, iterations: int = ROUNDS) -> Local:
     """Return the fit with one cluster more: the best split of a heavy cluster, then EM."""
     clusters = fit.clusters
     mass = task.weight @ clusters
@@ -142,13 +143,13 @@ def grow(task: Task, fit: Local, iterations: int = 60) -> Local:
     return improve(task, best, iterations)
 
 
-def shrink(task: Task, fit: Local, iterations: int = 60) -> Local:
+def shrink(task: Task, fit: Local) -> Local:
     """Return the fit with one cluster less: the lightest gives its rows to the others."""
     clusters = fit.clusters
     lightest = int(np.argmin(task.weight @ clusters))
     rest = np.delete(clusters, lightest, axis=1) + NOTHING
     rest = rest / rest.sum(axis=1, keepdims=True)
-    return improve(task, evaluate(task, refit(task, fit.family, rest)), iterations)
+    return improve(task, evaluate(task, refit(task, fit.family, rest)), ROUNDS)
 
 
 def _trial(task: Task, fit: Local, clusters: Floats) -> Local:

@@ -232,15 +232,12 @@ def resized(search: Search, state: State, g: int, size: int, inputs: Inputs) -> 
 # --- lateral edges ------------------------------------------------------------------------------
 
 
-def greedy_edges(search: Search, state: State, bits: bool = False) -> State:
+def greedy_edges(search: Search, state: State) -> State:
     """Add the lateral edge that raises the score most, until none does."""
     options = admissible(search.data, search.weights, search.layout)
     owners = parent_of(search.layout)
     gains: dict[tuple[int, int], float] = {
-        (g, parent): np.inf
-        for g, table in enumerate(options)
-        for parent in table
-        if bits or parent >= 0
+        (g, parent): np.inf for g, table in enumerate(options) for parent in table if parent >= 0
     }
     while gains:
         best = _best_edge(search, state, gains, options, owners)

@@ -59,9 +59,9 @@ class Scored:
         return Tried(len(self.fit.network.style), sizes, inputs, self.score)
 
 
-def scored(rows: Rows, network: Network, stop: Stop = WARM) -> Scored:
+def scored(rows: Rows, network: Network) -> Scored:
     """Return the network after EM, with its Cheeseman-Stutz score."""
-    fit = run(network, rows.data, rows.prior, weights=rows.weights, stop=stop)
+    fit = run(network, rows.data, rows.prior, weights=rows.weights, stop=WARM)
     score = cheeseman_stutz(fit.network, rows.data, rows.weights, fit.posterior, rows.prior)
     return Scored(fit, score)
 

@@ -36,11 +36,6 @@ def named(text: str) -> str:
     return text[:200]
 
 
-def in_degrees(name: str) -> bool:
-    """Tell whether a reference system measures longitude and latitude in degrees."""
-    return _unit(name) == "degree"
-
-
 def _unit(name: str) -> str:
     if name == "OGC:CRS84":
         return "degree"

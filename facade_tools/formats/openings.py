@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,12 +21,6 @@ DEEPEST = 2.0  # metres between an opening and the wall that takes it
 STOREYS = np.round(np.arange(2.4, 4.61, 0.05), 2)  # metres: heights that a storey may have
 USUAL_STOREY = 3.0
 CROSSING = 0.12  # metres of an opening on both sides of a storey line: it crosses
-SIDE_OF_QUARTER: Mapping[str, Side] = {
-    "right": "right",
-    "back": "back",
-    "left": "left",
-    "front": "front",
-}
 
 
 @dataclass(frozen=True)

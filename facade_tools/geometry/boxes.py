@@ -11,11 +11,9 @@ import numpy as np
 
 from ..artifacts.building import Box
 from ..compiled import compiled
-from .arrays import Booleans, Floats, Integers, Rectangles
+from .arrays import Floats, Integers, Rectangles
 
 RESOLUTION = 1e6  # plan positions per metre
-
-Grid = tuple[Floats, Floats, Booleans]  # xs (n+1,), ys (m+1,), filled (n, m)
 
 
 def rounded(values: Floats) -> Floats:
@@ -124,10 +122,3 @@ def union_area_perimeter(rectangles: Rectangles) -> tuple[float, float]:
     """
     area, perimeter = area_perimeter(rounded(rectangles).reshape(-1, 4))
     return float(area), float(perimeter)
-
-
-def union_grid(rectangles: Rectangles) -> Grid:
-    """Return the compressed grid of a union: positions of its lines and which cells it covers."""
-    edges = rounded(rectangles).reshape(-1, 4)
-    xs, ys = edge_positions(edges)
-    return xs, ys, cell_counts(edges, xs, ys) > 0

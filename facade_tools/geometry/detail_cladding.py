@@ -32,7 +32,7 @@ def wall_pattern(building: Building, color: str) -> str:
     return "" if styles == {"flat"} else "siding"
 
 
-def cladding(solid: Solid, pattern: str, name: str = "cladding") -> list[Mesh]:
+def cladding(solid: Solid, pattern: str) -> list[Mesh]:
     """Return the skin of all walls in a pattern; no pattern needs none."""
     vertices, faces, uv = [], [], []
     count = 0
@@ -51,15 +51,16 @@ def cladding(solid: Solid, pattern: str, name: str = "cladding") -> list[Mesh]:
         count += len(points)
     if not vertices:
         return []
-    return [Mesh(name, np.concatenate(vertices), np.concatenate(faces), "wall", np.concatenate(uv))]
+    points, triangles = np.concatenate(vertices), np.concatenate(faces)
+    return [Mesh("cladding", points, triangles, "wall", np.concatenate(uv))]
 
 
-def corner_boards(solid: Solid, pattern: str, name: str = "corner-boards") -> list[Mesh]:
+def corner_boards(solid: Solid, pattern: str) -> list[Mesh]:
     """Return the boards that cover the outer corners of boarded walls (axis-aligned walls only)."""
     if pattern != "siding":
         return []
     boxes = [_board(*corner) for corner in _outer_corners(solid)]
-    return meshes_of(name, {"trim": boxes}, WORLD)
+    return meshes_of("corner-boards", {"trim": boxes}, WORLD)
 
 
 def _outer_corners(solid: Solid) -> Iterator[tuple[Points3, Floats]]:

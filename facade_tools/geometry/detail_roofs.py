@@ -6,7 +6,7 @@ shared with another roof face stay on their line, so that neighbours still meet 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,8 +25,6 @@ RAKE = 0.75  # overhang of a gable's edge relative to that of the eaves
 PATTERN = "shingle"
 MOST_DROP = 0.5  # metres, or the overhang if that is more: what eaves hang down at most
 MITER = 4.0  # a corner moves at most this many overhangs
-
-Overhang = Callable[[str], float]  # metres, by the owner of a face
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from ..artifacts.parse import LABELS, Parse
+from ..artifacts.parse import Parse
 from .homography import warped
 from .image_io import Picture, fitted, read_photo
 
@@ -17,14 +16,7 @@ COLORS = {
     "balcony": (128, 40, 210), "door": (240, 140, 30), "roof": (50, 80, 190),
     "sky": (150, 220, 245), "shop": (60, 170, 80), "chimney": (128, 128, 128),
 }  # fmt: skip
-PALETTE = np.array([COLORS[name] for name in LABELS], np.uint8)
 MAX_VIEW = 1600  # pixels of the longer side
-
-
-def colored(labels: NDArray[np.uint8]) -> Picture:
-    """Return the label map in colours."""
-    picture: Picture = PALETTE[labels]
-    return picture
 
 
 def overlay(picture: Picture, parse: Parse, strength: float = 0.45) -> Picture:

@@ -14,7 +14,6 @@ from .search import Clock, GroupSearch
 from .words import MAX_LETTERS, MAX_WORDS
 
 QUALIFIERS = ("unoccludable", "attached", "opaque")
-NEAREST = 3
 
 
 def explanation(

@@ -21,8 +21,6 @@ QUICK = Effort(labels=20_000, steps=400_000, nodes=32, beam=24)
 PROVING = 0.65  # share of the time after which an answer goes before a proof
 MAX_CANDIDATES = 100_000  # kept of one group at one tolerance
 
-Accept = Callable[[Alignment], bool]
-
 
 class Stage(NamedTuple):
     """One step of the search: tolerance (a share of the canvas), and whether letters may split."""

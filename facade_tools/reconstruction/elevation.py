@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -282,12 +282,3 @@ def _chimneys(high: Sequence[Rect], top: float) -> Iterator[Rect]:
     for rect in _joined([r for r in high if r.label == "chimney"]):
         if rect.v1 > top + 0.2 and rect.width >= LEAST[0]:
             yield rect
-
-
-def summary(plan: Elevation) -> Mapping[str, float]:
-    """Return the numbers of an elevation that people ask for."""
-    return {
-        "width": plan.width, "eaves": plan.eaves, "loft": plan.loft,
-        "storeys": len(plan.lines) - 1, "openings": len(plan.openings),
-        "dormers": len(plan.dormers), "balconies": len(plan.balconies),
-    }  # fmt: skip

@@ -73,12 +73,12 @@ def view_of_parse(parse: Parse) -> SideView:
     return _view(labels, windows, doors, scale)
 
 
-def view_of_labels(labels: Labels, scale: float | None = None) -> SideView:
-    """Return what a label map shows; connected pixels are one opening. scale: metres of a pixel.
+def view_of_labels(labels: Labels) -> SideView:
+    """Return what a label map shows; connected pixels are one opening.
 
     Raises InvalidInput where it shows no wall.
     """
-    return _view(labels, _components(labels, WINDOW), _components(labels, DOOR), scale)
+    return _view(labels, _components(labels, WINDOW), _components(labels, DOOR), None)
 
 
 def _components(labels: Labels, label: int) -> Boxes:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..geometry.arrays import Booleans, Floats, Integers
+from ..geometry.arrays import Booleans, Integers
 from .remesh import Slab
 
 
@@ -44,9 +44,9 @@ class WallFace:
         return self.width, self.height
 
 
-def wall_faces(slab: Slab, index: int, block: int = 0) -> list[WallFace]:
+def wall_faces(slab: Slab, index: int) -> list[WallFace]:
     """Return the upright faces of a slab: one for every straight stretch of its outline."""
-    return faces_towards(slab, np.pad(~slab.cells, 1, constant_values=True), index, block)
+    return faces_towards(slab, np.pad(~slab.cells, 1, constant_values=True), index)
 
 
 def faces_towards(slab: Slab, beyond: Booleans, index: int, block: int = 0) -> list[WallFace]:
@@ -84,8 +84,3 @@ def _faces(side: str, slab: Slab, beyond: Booleans, indices: tuple[int, int]) ->
 def _runs(mask: Booleans) -> Integers:
     padded = np.concatenate([[False], mask, [False]])
     return np.flatnonzero(padded[1:] != padded[:-1]).reshape(-1, 2)
-
-
-def face_extent(face: WallFace) -> Floats:
-    """Return the lesser and the greater end of a face along its wall (m)."""
-    return np.array(sorted((face.start, face.end)))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -23,12 +22,11 @@ from facade_tools.imaging.homography import warped
 from facade_tools.imaging.image_io import PICTURES, Photo, read_labels, read_photo
 from facade_tools.imaging.label_views import overlay
 from facade_tools.imaging.rectify import Rectification
-from facade_tools.parallel import map_ordered
 from facade_tools.randomness import item_generator
 
+from ._items import each
 from ._options import StreamOptions, refuse_overwriting
 from ._rectifying import check_rectification, rectification_of, tell_angle
-from ._report import Progress
 from ._stream import (
     Faults,
     file_name,
@@ -183,19 +181,11 @@ def run_parse(stream: StreamOptions, options: ParseOptions) -> None:
         *_report_source(options),
     )
     read = Read(options, stream.seed or 0, sources, is_single(stream.output))
-    outcomes = map_ordered(read, paths, jobs=stream.jobs, scheduler=stream.scheduler)
-    progress, faults = Progress(NAME), Faults(NAME, stream.on_error)
-    with open_sink(stream.output) as write, closing(outcomes):
-        for outcome in outcomes:
-            if outcome.value is not None:
-                write(outcome.value.id, outcome.value.parse)
-                _write_pictures(outcome.value, options, len(paths) > 1)
-            elif outcome.error is None:
-                continue
-            else:
-                faults(outcome.error)
-            progress.advance()
-        progress.close()
+    faults = Faults(NAME, stream.on_error)
+    with open_sink(stream.output) as write:
+        for result in each(read, stream, faults, paths):
+            write(result.id, result.parse)
+            _write_pictures(result, options, len(paths) > 1)
     faults.complain()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import importlib.util
 import re
 from pathlib import Path
@@ -52,6 +53,26 @@ def test_commands_in_the_docs_are_commands(page):
     for block in re.findall(r"```(?:sh|bash|console)\n(.*?)```", page.read_text(), re.S):
         for stage in re.findall(r"(?:^|[|&;]\s*|\$ )facade (?:-\S+ )*([a-z][a-z-]*)", block, re.M):
             assert stage in STAGES, f"{page.name}: facade {stage}"
+
+
+def _raised(function):
+    """Yield the names of the errors that a function raises itself."""
+    for node in ast.walk(function):
+        if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call):
+            yield ast.unparse(node.exc.func)
+
+
+def test_public_functions_tell_what_they_raise():
+    silent = []
+    for path in sorted((ROOT / "facade_tools").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
+                text = (ast.get_docstring(node) or "").lower()
+                told = any(word in text for word in ("raise", "refuse"))
+                expected = {"InvalidInput", "Infeasible", "OutputFailed", "ValueError"}
+                if not told and expected & set(_raised(node)):
+                    silent.append(f"{path.name}:{node.lineno} {node.name}")
+    assert not silent
 
 
 def _commands(page):

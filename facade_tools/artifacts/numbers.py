@@ -19,7 +19,10 @@ class Given(float):
 
 
 def parse_float(text: str) -> float:
-    """Read a JSON number; numbers that rounding would change become `Given`."""
+    """Read a JSON number; numbers that rounding would change become `Given`.
+
+    Raises ValueError on what no float holds (1e999).
+    """
     value = float(text)
     if math.isinf(value):
         raise ValueError(f"{text} is out of range")

@@ -82,6 +82,8 @@ def learn_readings(
     """Return the model of rows that are no buildings: what nobody observes stays unknown.
 
     `unobserved` lists that.
+
+    Raises InvalidInput on fewer than two rows.
     """
     if len(readings) < 2:
         raise InvalidInput(f"{len(readings)} rows to learn from; expected at least 2")

@@ -104,7 +104,10 @@ def layout_energy(layout: Layout, target: Target, work: Work) -> float:
 
 
 def layout_of(boxes: Iterable[Box], *, locked: bool = False) -> Layout:
-    """Return boxes as a layout; `locked` ones keep their plan, and their height where known."""
+    """Return boxes as a layout; `locked` ones keep their plan, and their height where known.
+
+    Raises InvalidInput on more boxes than a search takes.
+    """
     boxes = tuple(boxes)
     if len(boxes) > CAPACITY - 4:
         message = f"{len(boxes)} boxes; expected at most {CAPACITY - 4} for a generated mass"

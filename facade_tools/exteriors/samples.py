@@ -144,7 +144,10 @@ def draw(source: Source, rng: np.random.Generator) -> Iterator[Block]:
 def top(
     blocks: Iterator[Block], n: int, finder: Neighbours, options: SampleOptions
 ) -> Iterator[Block]:
-    """Yield one block: the n most probable distinct rows of a pool."""
+    """Yield one block: the n most probable distinct rows of a pool.
+
+    Raises Infeasible where fewer than n differ.
+    """
     pool = next(blocks)
     while len(pool.style) < max(POOL, POOL_EACH * n):
         more = next(blocks)
@@ -164,7 +167,10 @@ def top(
 
 
 def apart(blocks: Iterator[Block], finder: Neighbours, distance: float) -> Iterator[Block]:
-    """Yield the rows that keep their distance from training rows and from earlier ones."""
+    """Yield the rows that keep their distance from training rows and from earlier ones.
+
+    Raises Infeasible where LIMIT draws in a row come too near.
+    """
     earlier: Floats = finder.training()
     turned_down = 0
     for block in blocks:

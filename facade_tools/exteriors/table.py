@@ -289,7 +289,10 @@ def within(table: Table, limits: Sequence[Limit], refuse: Refuse = stop) -> Tabl
 
 
 def table_readings(table: Table, declaration: Declaration) -> tuple[Layout, Readings]:
-    """Return layout and readings of a table whose columns keep the declared limits."""
+    """Return layout and readings of a table whose columns keep the declared limits.
+
+    Raises InvalidInput where two columns would mean one thing.
+    """
     groups = tuple(
         _layout(name, row, np.stack([table.columns[c] for c in row.columns], axis=1))
         for name, row in declaration.groups.items()

@@ -242,7 +242,10 @@ def _named(columns: Columns) -> set[str]:
 
 
 def build(record: Record, options: ReadOptions) -> Built:
-    """Return the attributes of one row."""
+    """Return the attributes of one row.
+
+    Raises InvalidInput on a row of another length, and without an id.
+    """
     header, columns, dialect = record.payload
     values = dialect.row(record.data or b"")
     if len(values) != len(header):

@@ -100,7 +100,10 @@ class _Source:
 
 
 def build(record: Record, options: ReadOptions) -> Built:
-    """Return the footprints (or buildings) of one feature."""
+    """Return the footprints (or buildings) of one feature.
+
+    Raises InvalidInput on what is no feature.
+    """
     payload: Feature = record.payload
     feature = payload.value if record.data is None else parse_json(record.data)
     notes: Counter[str] = Counter()

@@ -48,7 +48,10 @@ def detect(head: bytes) -> bool:
 
 
 def records(stream: BinaryIO, options: ReadOptions) -> Iterator[Record]:
-    """Yield a record a building."""
+    """Yield a record a building.
+
+    Raises InvalidInput where there is none.
+    """
     root = xmltree.parse(read_whole(stream))
     buildings = root.findall("Building")
     if not buildings:

@@ -33,7 +33,10 @@ def detect(head: bytes) -> bool:
 
 
 def records(stream: BinaryIO, options: ReadOptions) -> Iterator[Record]:
-    """Yield a record a building of the model."""
+    """Yield a record a building of the model.
+
+    Raises InvalidInput unless there is one.
+    """
     opened = _opened(read_whole(stream))
     buildings = opened.by_type("IfcBuilding")
     if len(buildings) != 1:

@@ -118,6 +118,8 @@ def shape_of(
     plan: the footprint along the axes, metres; turn: degrees by which the map was turned
     clockwise to get there. The tag `height` is the roof's top: the roof is subtracted, and where
     less than 2.5 m of wall would be left, its pitch is lowered.
+
+    Raises InvalidInput on eaves that no building has (below 1 m, above 500 m).
     """
     tags = _readable(canonical(tags), notes)
     style = SHAPES[str(tags.get("roof:shape", "flat"))]

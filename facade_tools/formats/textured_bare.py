@@ -13,7 +13,10 @@ from .textured_polygons import MAX_CORNERS
 
 
 def read_bare(path: Path) -> TexturedMesh:
-    """Return the triangles of a file, their equal corners joined, in one grey paint."""
+    """Return the triangles of a file, their equal corners joined, in one grey paint.
+
+    Raises InvalidInput on what is no mesh, or too large a one.
+    """
     import trimesh
 
     data = io.BytesIO(read_bytes(path))

@@ -111,7 +111,10 @@ class _File:
 
     # --- where meshes stand -----------------------------------------------------------------------
     def instances(self) -> Iterator[tuple[Any, Floats]]:
-        """Yield the meshes that the scene shows, each with its place (4, 4)."""
+        """Yield the meshes that the scene shows, each with its place (4, 4).
+
+        Raises ValueError where nodes hold themselves.
+        """
         nodes = self.document.get("nodes", [])
         stack = [(root, np.eye(4), 0) for root in self._roots(nodes)]
         seen = 0
@@ -184,7 +187,10 @@ class _File:
 
     # --- numbers ----------------------------------------------------------------------------------
     def accessor(self, number: int) -> Floats:
-        """Return the values (n, width) of an accessor; integers that stand for shares as shares."""
+        """Return the values (n, width) of an accessor; integers that stand for shares as shares.
+
+        Raises ValueError on more values than a mesh may have.
+        """
         one = self.document["accessors"][number]
         kind, width = np.dtype(TYPES[one["componentType"]]), WIDTHS[one["type"]]
         count = int(one["count"])

@@ -31,7 +31,10 @@ def parse(data: bytes) -> Element:
 
 
 def iterate(stream: BinaryIO, names: Collection[str]) -> Iterator[Element]:
-    """Yield every outermost element of these names, with its whole content, one in memory."""
+    """Yield every outermost element of these names, with its whole content, one in memory.
+
+    Raises InvalidInput, with the line, on broken XML.
+    """
     depth = 0
     stack: list[Element] = []
     try:

@@ -91,7 +91,10 @@ class _Compiler:
         self.states: list[RowState] = []
 
     def plan(self) -> Plan:
-        """Expand the axiom until rows are left, then build their automaton."""
+        """Expand the axiom until rows are left, then build their automaton.
+
+        Raises InvalidInput on a grammar of too many kinds of rows.
+        """
         axiom = self.grammar.axiom
         tree = self._expanded(axiom, Size(), (), ())
         rows = automaton(tree)

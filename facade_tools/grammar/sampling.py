@@ -88,7 +88,10 @@ class _Sampler:
         self.count = 0
 
     def node(self, symbol: str, scope: tuple[float, ...], depth: int) -> Node:
-        """Derive a shape and all below it."""
+        """Derive a shape and all below it.
+
+        Raises Infeasible where that does not end.
+        """
         self.count += 1
         if depth > MAX_DEPTH or self.count > MAX_NODES:
             raise Infeasible(f"the derivation does not end: {depth} levels down at {symbol!r}")

@@ -182,7 +182,10 @@ def fitted(picture: Picture, height: int, pixels: int) -> Picture:
 
 
 def encoded(picture: NDArray[np.uint8], ending: str) -> bytes:
-    """Return the bytes of an RGB picture or a label map in the format of a file ending."""
+    """Return the bytes of an RGB picture or a label map in the format of a file ending.
+
+    Raises InvalidInput on an ending of no picture.
+    """
     turned = picture[:, :, ::-1] if picture.ndim == 3 else picture
     options = [cv2.IMWRITE_JPEG_QUALITY, 92] if ending in (".jpg", ".jpeg") else []
     try:

@@ -103,7 +103,10 @@ def mesh_of(name: str, entry: Mapping[str, Any]) -> Asset:
 
 
 def unit_mesh(text: str) -> Asset:
-    """Read an OBJ text (z up, front towards −y), scaled to the unit cube; polygons are fanned."""
+    """Read an OBJ text (z up, front towards −y), scaled to the unit cube; polygons are fanned.
+
+    Raises InvalidInput on what is no such text, or has no faces.
+    """
     points: list[tuple[float, ...]] = []
     faces: list[tuple[int, int, int]] = []
     for number, line in enumerate(text.splitlines(), 1):

@@ -14,6 +14,7 @@ from ..geometry.arrays import Floats
 
 STOREY = 3.0  # metres, where nobody says
 STOREYS = 6.0  # in a picture whose parse has no floors
+MOST_PIXELS = 64_000_000  # of a label map: one of a broken parse would fill any memory
 LEAST = (0.3, 0.35)  # metres, width and height of the smallest element
 NEAR = 0.3  # metres between balconies that are one
 STEEP = 0.6  # share of a window's width that a balcony below it must cover to stand before it
@@ -130,10 +131,13 @@ def stretched(plan: Elevation, width: float, top: float | None = None) -> Elevat
 
 # --- lines of the building ------------------------------------------------------------------------
 def label_map(parse: Parse) -> NDArray[np.uint8]:
-    """Return the regions as a map (height, width) of indices into LABELS."""
+    """Return the regions as a map (height, width) of indices into LABELS.
+
+    Raises InvalidInput where they are larger than any picture.
+    """
     width = max(region.x1 for region in parse.regions)
     height = max(region.y1 for region in parse.regions)
-    if width * height > 64_000_000:
+    if width * height > MOST_PIXELS:
         raise InvalidInput(f"regions of {width}×{height} pixels; expected a picture")
     out = np.zeros((height, width), np.uint8)
     for region in parse.regions:

@@ -58,7 +58,10 @@ class Lot:
 def default_lot(
     grammar: ShapeGrammar, values: Mapping[str, float], rng: np.random.Generator
 ) -> Lot:
-    """Return the rectangle that the grammar stands on where no footprint is given."""
+    """Return the rectangle that the grammar stands on where no footprint is given.
+
+    Raises InvalidInput on lengths that are none.
+    """
     try:
         width = expressions.number(grammar.lot.width, values, rng)
         depth = expressions.number(grammar.lot.depth, values, rng)

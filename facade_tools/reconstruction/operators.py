@@ -163,7 +163,10 @@ def _sizes(rows: Sequence[tuple[str, object]], whole: float, measure: Measure) -
 
 
 def repeat(shape: Shape, axis: str, each: float, symbol: str) -> Iterator[Shape]:
-    """Yield as many equal parts as come nearest to the size `each` (m), at least one."""
+    """Yield as many equal parts as come nearest to the size `each` (m), at least one.
+
+    Raises InvalidInput on a size that is none, or that gives too many parts.
+    """
     whole = float(shape.scope.size[AXES[axis]])
     if each <= 0.0:
         raise InvalidInput(f"repeats a part of {each:.6g} m")
@@ -200,7 +203,10 @@ def _reflected(shape: Shape, axis: int) -> Shape:
 
 # --- faces ----------------------------------------------------------------------------------------
 def component_split(shape: Shape, into: Mapping[str, str]) -> Iterator[Shape]:
-    """Yield the faces of a solid that `into` names by side, by `side`, `top`, `bottom`, `all`."""
+    """Yield the faces of a solid that `into` names by side, by `side`, `top`, `bottom`, `all`.
+
+    Raises InvalidInput on what is no upright solid.
+    """
     if shape.thickness <= FLAT or shape.plane == "y":
         raise InvalidInput("faces needs a solid that stands on its outline")
     faces = [*_walls(shape), *_caps(shape)]

@@ -172,7 +172,10 @@ def default() -> Classifier:
 
 
 def decoded(data: bytes) -> Classifier:
-    """Return the classifier of a file's bytes, every array checked."""
+    """Return the classifier of a file's bytes, every array checked.
+
+    Raises InvalidInput on what is none.
+    """
     arrays = _arrays(data)
     try:
         if str(arrays["format"]) != FORMAT:

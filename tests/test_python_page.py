@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
 import pytest
 
 from facade_tools.artifacts.building import Building
+from facade_tools.artifacts.documents import decode, encode, parse_json
+from facade_tools.artifacts.numbers import dump_line
 from facade_tools.cli._group import STAGES
 from facade_tools.geometry.mesh import Scene
+from facade_tools.randomness import item_generator
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
@@ -59,3 +63,15 @@ def test_every_stage_has_a_function_that_the_blocks_call():
     first = [re.findall(r"`([\w.]+)`", functions)[0] for _, functions in rows]
     missing = [name for name in first if f"{name.rpartition('.')[2]}(" not in called]
     assert not missing
+
+
+def test_with_the_generator_of_the_command_line_the_result_is_its_result(names, facade_here):
+    row = names["building_attributes"](names["houses"][0])
+    line = dump_line(encode(row))
+    done = facade_here("massgen", "-", "--seed", 3, stdin=line)
+    made = decode(parse_json(done.stdout), "building")
+    again = decode(parse_json(line), "attributes")
+    rng = item_generator(3, "massgen", row.id)
+    (own,) = names["generate_mass"](again, rng=rng)
+    written = decode(parse_json(dump_line(encode(own))), "building")
+    assert written == replace(made, provenance=None)

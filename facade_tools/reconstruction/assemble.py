@@ -6,7 +6,7 @@ What no picture shows stays open: the building is partial, its unseen sides are 
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -47,7 +47,9 @@ class Assembly:
 
     mass: boxes from a footprint or a building; None: a rectangle as wide as the pictures show.
     storey: height of a storey (m). roof: of all boxes. style: of windows. door: put a main door
-    into the front where none is seen.
+    into the front where none is seen. depth: of that rectangle, from the seen side to the unseen
+    one (m); where it is said, the mass is known. porch: there may be porches, of which pictures
+    do not tell.
     """
 
     mass: Building | None = None
@@ -55,6 +57,8 @@ class Assembly:
     roof: Roof | None = None
     style: str = "unknown"
     door: bool = True
+    depth: float | None = None
+    porch: bool = True
 
 
 def assemble(identity: str, views: Mapping[Side, SideView], known: Assembly) -> Building:
@@ -77,7 +81,8 @@ def assemble(identity: str, views: Mapping[Side, SideView], known: Assembly) -> 
     if known.door and "front" in facades:
         facades["front"] = _with_door(facades["front"], mass.storey_height)
     tags = {**mass.tags, "assembled": {side: view.storeys for side, view in views.items()}}
-    return replace(mass, id=identity, facades=facades, tags=tags)
+    complete = mass.complete if known.porch else _ordered({*mass.complete, "porch"})
+    return replace(mass, id=identity, facades=facades, complete=complete, tags=tags)
 
 
 def _storey_height(views: Mapping[Side, SideView], known: Assembly) -> float:
@@ -106,10 +111,12 @@ def _mass(
         [_width(views[side], storey) for side in pair if side in views]
         for pair in (("front", "back"), ("left", "right"))
     ]
-    width, depth = (round(sum(s) / len(s), 3) if s else LEAST_DEPTH for s in sizes)
+    unseen = LEAST_DEPTH if known.depth is None else known.depth
+    width, depth = (round(sum(s) / len(s), 3) if s else unseen for s in sizes)
     height = round(count * storey, 3)
     box = Box("main", "general", width / 2, depth / 2, width, depth, height, known.roof)
-    complete = _complete(views, seen=all(map(bool, sizes)), roof=known.roof is not None)
+    seen = known.depth is not None or all(map(bool, sizes))
+    complete = _complete(views, seen=seen, roof=known.roof is not None)
     return Building(identity, (box,), storey_height=storey, partial=True, complete=complete)
 
 
@@ -141,10 +148,13 @@ def _fitted(known: Assembly, storey: float, count: int) -> Building:
     storey = min(round(storey, 6), round(1.99 * lowest, 6))
     boxes = tuple(_completed(box, round(count * storey, 3), known.roof) for box in mass.boxes)
     roofs = all(box.roof is not None for box in boxes)
-    parts: set[str] = {"mass", *mass.complete} | ({"roof"} if roofs else set())
-    order: tuple[MassPart, ...] = ("mass", "garage", "porch", "roof")
-    complete = tuple(part for part in order if part in parts)
+    complete = _ordered({"mass", *mass.complete} | ({"roof"} if roofs else set()))
     return replace(mass, boxes=boxes, storey_height=storey, partial=True, complete=complete)
+
+
+def _ordered(parts: Collection[str]) -> tuple[MassPart, ...]:
+    order: tuple[MassPart, ...] = ("mass", "garage", "porch", "roof")
+    return tuple(part for part in order if part in parts)
 
 
 def _completed(box: Box, height: float, roof: Roof | None) -> Box:

@@ -27,6 +27,7 @@ from ..errors import InvalidInput
 from ..geometry.boxes import box_rectangles
 from ..geometry.floors import mass_boxes
 from ..geometry.pieces import facade_pieces
+from .axes import on_axes
 from .sides import SideView
 
 log = logging.getLogger("facade_tools.reconstruction")
@@ -74,7 +75,7 @@ def assemble(identity: str, views: Mapping[Side, SideView], known: Assembly) -> 
     mass = _mass(identity, views, known, storey, count)
     pieces = facade_pieces(mass)
     facades = {
-        side: Facade(_filled(mass, side, pieces[side], views[side], known))
+        side: Facade(tuple(on_axes(side, _filled(mass, side, pieces[side], views[side], known))))
         for side in SIDES
         if side in views
     }

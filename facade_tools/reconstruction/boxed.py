@@ -17,6 +17,7 @@ from ..geometry.detail_boxes import side_frame
 from ..geometry.pieces import facade_pieces
 from ..geometry.polygons import shape_of
 from ..geometry.rectilinear import partition
+from .axes import on_axes
 from .drawing import opening_of
 from .engine import Derived, Leaf
 from .volumes import Volume, standing
@@ -62,7 +63,9 @@ def derived_building(
     bare = Building(identity, boxes, {}, storey)
     sides = frozenset(known)
     placed = [p for leaf in derived.leaves for p in _placed(leaf, sides)]
-    facades = {side: Facade(tuple(pieces)) for side, pieces in _filled(bare, placed).items()}
+    facades = {
+        side: Facade(tuple(on_axes(side, pieces))) for side, pieces in _filled(bare, placed).items()
+    }
     building = _sound(replace(bare, facades=facades))
     if any(element.main for element in _elements(building)):
         return building

@@ -28,6 +28,7 @@ from ..geometry.boxes import box_rectangles
 from ..geometry.floors import mass_boxes
 from ..geometry.pieces import facade_pieces
 from .axes import on_axes
+from .doors import USUAL, door_head
 from .sides import SideView
 
 log = logging.getLogger("facade_tools.reconstruction")
@@ -36,9 +37,6 @@ STOREY = 3.0  # m: a storey where nothing says how high it is
 STOREYS = (2.2, 6.0)  # m: storeys that a given height may have
 LEAST_DEPTH = 4.0  # m: of a building of which one side only is seen
 LEAST_OPENING = 0.25  # m: smaller ones are left out
-DOOR = (1.0, 2.1)  # m: a main door that nobody sees
-LEAST_DOOR = (0.6, 1.0)  # m: narrower, or with a lower head, it is a fragment and no door
-LOW_DOOR = 1.6  # m: whose head is lower was seen in part, and gets the usual height
 MARGIN = 0.02  # m between an opening and its piece's borders
 
 
@@ -223,9 +221,10 @@ def _openings(view: SideView, width: float, storey: float) -> list[_Opening]:
             low, high = ((ground - y) / (ground - ceiling) * storey for y in (y1, y0))
             place = ((x0 - view.x0) * across, (x1 - view.x0) * across)
             if kind == "door":
-                if place[1] - place[0] < LEAST_DOOR[0] or high < LEAST_DOOR[1]:
+                head = door_head(place[1] - place[0], high, storey)
+                if head is None:
                     continue
-                high = high if high >= LOW_DOOR else min(DOOR[1], 0.9 * storey)
+                high = head
             out.append(_Opening(kind, floor, *place, max(low, 0.0), min(high, storey)))
     return sorted(out, key=lambda o: (o.kind, -(o.right - o.left) * (o.high - o.low)))
 
@@ -310,15 +309,15 @@ def _with_door(front: Facade, storey: float) -> Facade:
     for piece in sorted(ground, key=lambda p: -p.width):
         place = _free_place(piece, storey)
         if place is not None:
-            height = round(min(DOOR[1], 0.9 * piece.height), 4)
-            guess = Element("door", "plain", place, 0.0, DOOR[0], height, main=True)
+            height = round(min(USUAL[1], 0.9 * piece.height), 4)
+            guess = Element("door", "plain", place, 0.0, USUAL[0], height, main=True)
             return _exchanged(front, piece, None, guess)
     return front
 
 
 def _free_place(piece: Piece, storey: float) -> float | None:
     """Return where a door fits between the windows that reach down to it, nearest the middle."""
-    width, height = DOOR[0], min(DOOR[1], 0.9 * storey)
+    width, height = USUAL[0], min(USUAL[1], 0.9 * storey)
     middle: float = (piece.width - width) / 2
     taken = sorted((e.u, e.u + e.width) for e in piece.elements if e.v < height)
     places: list[float] = []

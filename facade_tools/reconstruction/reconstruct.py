@@ -78,7 +78,7 @@ class Reconstruction:
     def building(self) -> Building:
         """Return the parametric building; what the front shows is known."""
         made = derived_building(
-            self.derived, self.name, self.plan.storey, ["front"] if self.seen else []
+            self.derived, self.name, self.plan.storey, ["front"] if self.seen else [], axes=True
         )
         colors = self.surfaces.colors
         own = Colors(colors["wall"], "#efeae0", colors["roof"], colors["door"])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import cycle
 from pathlib import Path
 from typing import Any, get_args
 
@@ -34,6 +35,7 @@ CLASSES = "ecp"
 PITCH = 35.0  # degrees of a roof whose pitch nobody says
 
 Item = RawItem | str  # of a stream of artifacts, or the path of a label map
+Task = tuple[Item, Building | None]  # and the mass that stands on its footprint
 
 
 @dataclass(frozen=True)
@@ -56,18 +58,19 @@ class Assemble:
     sources: tuple[Source, ...]
     indented: bool
 
-    def __call__(self, item: Item) -> ItemResult:
+    def __call__(self, task: Task) -> ItemResult:
         """Return the building of one view."""
+        item, mass = task
         with collected_log() as messages:
             seen = _seen(item, self.classes)
-            return ItemResult((self.made({self.side: seen}),), messages)
+            return ItemResult((self.made({self.side: seen}, mass),), messages)
 
-    def made(self, seen: Mapping[Side, Seen]) -> tuple[str, bytes]:
+    def made(self, seen: Mapping[Side, Seen], mass: Building | None) -> tuple[str, bytes]:
         """Return id and bytes of the building that the views show, named after the first."""
         identity = next(iter(seen.values())).id
         views = {side: one.view for side, one in seen.items()}
         inputs = (*(one.source for one in seen.values()), *self.sources)
-        building = assemble(identity, views, self.known)
+        building = assemble(identity, views, replace(self.known, mass=mass))
         provenance = Provenance(NAME, None, self.recorded, inputs)
         document = encode(replace(building, provenance=provenance))
         return identity, dump_document(document) if self.indented else dump_line(document)
@@ -79,15 +82,20 @@ def run_assemble(stream: StreamOptions, values: Mapping[str, Any]) -> None:
     if bool(given) == bool(stream.inputs):
         raise click.UsageError("name parses, or sides with --front, --back, --left, --right")
     footprint = values["footprint"]
+    if footprint is not None and values["depth"] is not None:
+        raise click.UsageError("a footprint has its depth; expected --footprint or --depth")
+    masses = [None] if footprint is None else _masses(footprint, values["metres"])
     measured = footprint if footprint and SIZE.fullmatch(footprint) else None
     recorded = {key: values[key] for key in RECORDED} | _told(values, measured)
     stage = Assemble(
         Assembly(
-            None if footprint is None else _ground(footprint, values["metres"]),
+            None,
             values["storey_height"],
             None if values["roof"] is None else _roof(values["roof"]),
             values["windows"],
             not values["no_door"],
+            values["depth"],
+            not values["no_porch"],
         ),
         values["side"],
         convention(values["classes"]),
@@ -96,17 +104,21 @@ def run_assemble(stream: StreamOptions, values: Mapping[str, Any]) -> None:
         stream.output is not None and stream.output.lower().endswith(".json"),
     )
     if not given:
-        run_items(NAME, stage, _items(stream.inputs), stream)
+        run_items(NAME, stage, zip(_items(stream.inputs), cycle(masses), strict=False), stream)
         return
+    if len(masses) > 1:
+        raise InvalidInput(f"holds {len(masses)} footprints; expected one").at(footprint)
     with open_sink(stream.output) as write:
-        write(*stage.made({side: _only(path, stage.classes) for side, path in given.items()}))
+        views = {side: _only(path, stage.classes) for side, path in given.items()}
+        write(*stage.made(views, masses[0]))
 
 
 def _told(values: Mapping[str, Any], measured: str | None) -> dict[str, Any]:
     """Return the options that are recorded only where they are given."""
     classes = Path(values["classes"]).name
     given = {
-        "footprint": measured, "metres": values["metres"],
+        "footprint": measured, "metres": values["metres"], "depth": values["depth"],
+        "no_porch": values["no_porch"],
         "classes": None if classes == CLASSES else classes,
     }  # fmt: skip
     return {name: value for name, value in given.items() if value}
@@ -144,22 +156,26 @@ def _seen(item: Item, classes: Convention) -> Seen:
         raise error.at(item.source, item.line) from None
 
 
-def _ground(text: str, metres: bool) -> Building:
-    """Return the mass that a footprint gives; boxes of unknown height have none."""
+def _masses(text: str, metres: bool) -> list[Building | None]:
+    """Return the masses that footprints give; boxes of unknown height have none."""
     sizes = SIZE.fullmatch(text)
     if sizes:
         width, depth = float(sizes[1]), float(sizes[2])
         if not all(SIDE_LIMITS[0] <= side <= SIDE_LIMITS[1] for side in (width, depth)):
             raise click.UsageError(f"--footprint {text}: expected 2 to 1000 m a side")
         box = Box("main", "general", width / 2, depth / 2, width, depth)
-        return Building("footprint", (box,), partial=True)
-    found = list(_grounds(text, metres))
-    if len(found) != 1:
-        raise InvalidInput(f"holds {len(found)} footprints; expected one").at(text)
-    if isinstance(found[0], Footprint):
-        mass = building_of(found[0])
-        return mass if found[0].roof else _without_roofs(mass)
-    return replace(found[0], facades={})
+        return [Building("footprint", (box,), partial=True)]
+    found: list[Building | None] = [_ground(ground) for ground in _grounds(text, metres)]
+    if not found:
+        raise InvalidInput("holds no footprint; expected at least one").at(text)
+    return found
+
+
+def _ground(artifact: Footprint | Building) -> Building:
+    if isinstance(artifact, Building):
+        return replace(artifact, facades={})
+    mass = building_of(artifact)
+    return mass if artifact.roof else _without_roofs(mass)
 
 
 def _grounds(path: str, metres: bool) -> Iterator[Footprint | Building]:

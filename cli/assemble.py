@@ -23,8 +23,15 @@ def _side(name: str) -> Callable[[F], F]:
               show_default=True, help="Which side each PARSE shows.")  # fmt: skip
 @click.option(
     "--footprint", metavar="FILE|WxD",
-    help="GeoJSON, a footprint or a building; or width and depth, metres.  [default: as seen]",
+    help="GeoJSON, a footprint or a building (of several, each PARSE takes the next); or width"
+         " and depth, metres.  [default: as seen]",
 )  # fmt: skip
+@click.option(
+    "--depth",
+    type=FiniteRange(2, 1000),
+    metavar="M",
+    help="Metres behind a side, where there is no footprint.  [default: unknown]",
+)
 @click.option("--metres", is_flag=True, help="The GeoJSON's coordinates are planar metres.")
 @click.option("--roof", metavar="STYLE[:PITCH[:x|y]]",
               help="Roof as seen from above; pitch in degrees, ridge along x or y.")  # fmt: skip
@@ -34,6 +41,7 @@ def _side(name: str) -> Callable[[F], F]:
               default="unknown", show_default=True, help="Style of the windows.")  # fmt: skip
 @click.option("--classes", default="ecp", show_default=True, metavar="NAME|JSON",
               help="Convention of label maps: ecp, cmp, labelmefacade, a JSON file.")  # fmt: skip
+@click.option("--no-porch", is_flag=True, help="There is no porch; else that stays open.")
 @click.option("--no-door", is_flag=True, help="Put no main door where none is seen.")
 def command(stream: StreamOptions, **values: object) -> None:
     """Turn parses of facades into (partial) buildings that learn and the generators read.

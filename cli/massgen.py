@@ -29,6 +29,11 @@ from ._stream import ItemStage, run_stream, side_input
     help="Model of which attributes that PARTIAL contradicts are drawn anew.",
 )
 @click.option(
+    "--library",
+    metavar="BUILDINGS",
+    help="Buildings whose roofs these get: mansards, pitch, overhang.",
+)
+@click.option(
     "--require",
     type=FiniteRange(0),
     metavar="E",
@@ -39,6 +44,7 @@ def command(
     keep: str | None,
     candidates: int,
     model_path: str | None,
+    library: str | None,
     require: float | None,
 ) -> None:
     """Make mass models with roofs from attributes (FW16 6.1).
@@ -50,6 +56,7 @@ def command(
     Example: facade sample model.json -n 5 | facade massgen - -o masses.jsonl
     """
     from facade_tools.exteriors.massgen import generate_mass
+    from facade_tools.exteriors.roof_library import read_roof_library
 
     from ._learning import load_model
 
@@ -57,13 +64,14 @@ def command(
     model = None if model_path is None else load_model(model_path)[0]
     recorded = {"candidates": candidates, "require": require}
     options = {"keep": known, "candidates": candidates, "require": require, "model": model}
+    options["library"] = None if library is None else read_roof_library(library)
     stage = ItemStage(
         "massgen",
         ("attributes",),
         generate_mass,
         options,
         recorded,
-        side_input(keep) + side_input(model_path),
+        side_input(keep) + side_input(model_path) + side_input(library),
     )
     run_stream(stage, stream)
 

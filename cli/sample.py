@@ -23,7 +23,10 @@ from . import _options
     "training buildings and from each other.",
 )
 @click.option(
-    "--smooth", is_flag=True, help="Do not take up again the exact values that buildings share."
+    "--smooth",
+    is_flag=True,
+    help="Draw from the density alone: not the exact values that buildings share, and what none "
+    "of them shows.",
 )
 @_options.output
 @_options.seed

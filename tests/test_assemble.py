@@ -157,6 +157,20 @@ def test_a_roof_from_above_stands_on_every_box():
     assert "roof" in building.complete
 
 
+def test_a_stated_depth_makes_the_mass_known():
+    """What learn reads as the building's size and floors is then that of the pictures."""
+    views = {"front": view_of_labels(label_map(5, 4))}
+    open_ended = building_attributes(assemble("o", views, Assembly()))
+    known = building_attributes(assemble("k", views, Assembly(depth=11.0)))
+    assert open_ended.mass.bbox[2] is None
+    assert known.mass.bbox[1:] == (11.0, 15.0)
+    assert known.mass.arf == pytest.approx((1 / 3, 1 / 3, 1 / 3))
+    assert set(known.mass.garage) == {0.0}
+    assert set(known.mass.porch[0]) == {None}
+    bare = building_attributes(assemble("b", views, Assembly(depth=11.0, porch=False)))
+    assert set(bare.mass.porch[0]) == {0.0}
+
+
 def parse_of(labels: np.ndarray) -> Parse:
     """The label map as regions: runs of every row."""
     regions = []
@@ -220,6 +234,25 @@ def test_the_command_takes_label_maps_and_named_sides(tmp_path, facade_here):
     assert len(document["provenance"]["inputs"]) == 2
 
 
+def test_of_several_footprints_each_picture_takes_the_next(tmp_path, facade_here):
+    for name in "abc":
+        cv2.imwrite(str(tmp_path / f"{name}.png"), label_map(4, 5))
+    rings = [[[0, 0], [w, 0], [w, d], [0, d], [0, 0]] for w, d in ((12, 9), (15, 11))]
+    features = [{"type": "Feature", "properties": {}, "id": f"plot-{k}",
+                 "geometry": {"type": "Polygon", "coordinates": [ring]}}
+                for k, ring in enumerate(rings)]  # fmt: skip
+    plots = tmp_path / "plots.geojson"
+    plots.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    options = ("--footprint", plots, "--metres", "--jobs", "2")
+    pictures = [tmp_path / f"{name}.png" for name in "abc"]
+    done = facade_here("assemble", *pictures, *options)
+    boxes = [json.loads(line)["boxes"][0] for line in done.stdout.splitlines()]
+    assert [(box["width"], box["depth"]) for box in boxes] == [(12, 9), (15, 11), (12, 9)]
+    named = facade_here("assemble", "--front", pictures[0], *options[:3])
+    assert named.returncode == 3
+    assert b"holds 2 footprints" in named.stderr
+
+
 @pytest.mark.parametrize(("tags", "eaves", "storey"), [
     ({}, 12.0, 3.0), ({"building:levels": 5}, 15.0, 3.75), ({"height": "20 m"}, 20.0, 5.0),
 ])  # fmt: skip
@@ -244,6 +277,7 @@ def test_a_map_without_heights_leaves_them_to_the_picture(
     ((), 2, b"name parses"), (("--front", "missing.json"), 3, b"missing.json"),
     (("--front", "x.png", "--roof", "onion"), 2, b"expected STYLE"),
     (("--front", "x.png", "--footprint", "0x9"), 2, b"2 to 1000"),
+    (("x.png", "--footprint", "8x9", "--depth", "9"), 2, b"--footprint or --depth"),
 ])  # fmt: skip
 def test_what_is_wrong_is_said(facade_here, tmp_path, arguments, code, word):
     done = facade_here("assemble", *arguments, cwd=tmp_path)

@@ -86,6 +86,31 @@ def test_a_library_of_slim_windows_alone_still_fills_walls():
     assert sum(map(slim, windows)) > 5
 
 
+def test_no_sill_is_out_of_reach_where_heads_are_high():
+    """Storeys of 3.9 m with heads at 3.4 m: windows of 0.6 m under them would begin at 2.8 m."""
+    main = Box("main", "general", 6, 5, 12, 10, 11.7, Roof("flat"))
+    block = Building("block", (main,), storey_height=3.9)
+
+    def shelf(heights):
+        facades = {}
+        for side, pieces in facade_pieces(block).items():
+            rows = []
+            for piece in pieces:
+                found = tuple(
+                    Element("window", "fixed", 1.0 + 2 * k, 3.4 - h, 1.0, h)
+                    for k, h in enumerate(heights)
+                )
+                rows.append(replace(piece, elements=found))
+            facades[side] = Facade(tuple(rows))
+        return ElementLibrary(build_library([replace(block, facades=facades)]))
+
+    for heights in ((1.7, 1.7, 0.6), (0.6, 0.6)):
+        (done,) = made(block, library=shelf(heights))
+        assert list(building_problems(done)) == []
+        tall = {e.height for _, _, e in elements(done) if e.kind == "window"}
+        assert tall == {max(heights)}
+
+
 # --- library and colours ------------------------------------------------------------------------
 
 

@@ -11,7 +11,7 @@ import pytest
 from facade_tools.artifacts.attributes import Attributes, MassAttributes, Present
 from facade_tools.artifacts.building import Box, Building, Roof
 from facade_tools.artifacts.documents import decode, encode
-from facade_tools.errors import Infeasible
+from facade_tools.errors import Infeasible, InvalidInput
 from facade_tools.exteriors.annealing import PLAIN, anneal
 from facade_tools.exteriors.attributes import (
     attribute_vector,
@@ -29,6 +29,7 @@ from facade_tools.exteriors.mass_roofs import (
     under_tower,
 )
 from facade_tools.exteriors.massgen import generate_mass
+from facade_tools.exteriors.roof_library import RoofLibrary
 from facade_tools.geometry.boxes import box_rectangles, shared_outline
 from facade_tools.geometry.floors import floor_rectangles
 from facade_tools.imaging.mass_views import mass_pictures
@@ -242,6 +243,55 @@ def test_roof_bits_are_realised():
         wanted = targets("ell", roof=bits)
         (building,) = made(wanted)
         assert building_attributes(building).element.roof == wanted.element.roof
+
+
+def test_roofs_like_those_of_a_library():
+    """A hip is a mansard where the like building has one; its kind is still what the bits say."""
+
+    def house(name, style, pitch, height):
+        main = box("a", 0, 0, 12, 10, height, roof=Roof(style, pitch, "x", 0.2))
+        return Building(name, (main,), storey_height=3.0)
+
+    low, high = house("low", "hip", 30.0, 3.0), house("high", "mansard", 31.0, 15.0)
+    shelf = RoofLibrary([low, high, house("shed", "shed", 9.0, 15.0)])
+    for seed, like in ((1, high), (2, low)):
+        wanted = replace(building_attributes(like), id=like.id)
+        (made,) = generate_mass(wanted, rng=item_generator(seed, "m", "x"), library=shelf)
+        roof = made.boxes[0].roof
+        # Both have the bits of a hip: one of the most similar is drawn, sheds never.
+        assert (roof.style, roof.pitch) in {("mansard", 31.0), ("hip", 30.0)}
+        assert roof.overhang == 0.2
+        assert building_attributes(made).element.roof["hip"] == 1
+    (high_made,) = generate_mass(
+        building_attributes(high), rng=item_generator(3, "m", "x"), library=RoofLibrary([high])
+    )
+    assert high_made.boxes[0].roof.style == "mansard"
+    with pytest.raises(InvalidInput, match="no roof"):
+        RoofLibrary([Building("bare", (box("a", 0, 0, 9, 9, 3.0),), partial=True)])
+
+
+def test_the_roof_that_a_wanted_kind_lacks_in_the_library_is_drawn():
+    gable = box("a", 0, 0, 12, 10, 6.0, roof=Roof("gable", 33.0, "x", 0.2))
+    shelf = RoofLibrary([Building("g", (gable,), storey_height=3.0)])
+    flat = replace(gable, roof=Roof("flat"))
+    wanted = building_attributes(Building("f", (flat,), storey_height=3.0))
+    (made,) = generate_mass(wanted, rng=item_generator(1, "m", "x"), library=shelf)
+    assert made.boxes[0].roof == Roof("flat")
+
+
+def test_the_command_takes_roofs_of_buildings(facade, tmp_path):
+    main = box("a", 0, 0, 12, 10, 15.0, roof=Roof("mansard", 35.0, "x", 0.2))
+    house = Building("m", (main,), storey_height=3.0)
+    (tmp_path / "m.jsonl").write_text(json.dumps(encode(house)))
+    attributes = json.dumps(encode(building_attributes(house))).encode()
+    done = facade("massgen", "-", "--library", tmp_path / "m.jsonl", stdin=attributes)
+    made = json.loads(done.stdout)
+    assert made["boxes"][0]["roof"]["style"] == "mansard"
+    assert made["provenance"]["inputs"][1]["name"] == "m.jsonl"
+    (tmp_path / "none.jsonl").write_text("")
+    bad = facade("massgen", "-", "--library", tmp_path / "none.jsonl", stdin=attributes)
+    assert bad.returncode == 3
+    assert b"no roof" in bad.stderr
 
 
 def test_chimney_passes_through_the_roof():

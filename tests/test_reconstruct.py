@@ -105,6 +105,25 @@ def test_windows_reach_down_to_the_balcony_before_them():
     assert {round(r.v0, 6) for r in french} == {6.0}
 
 
+@pytest.mark.parametrize(("top", "right", "head"), [
+    (145, 68, 2.5), (158, 68, 2.1), (163, 68, None), (145, 57, None),
+])  # fmt: skip
+def test_fragments_of_doors_are_none_and_low_ones_get_the_usual_height(top, right, head):
+    rows = tuple(r for r in regions() if r.label != "door")
+    plan = elevation(parsed(regions=(*rows, Region("door", 52, top, right, HEIGHT))))
+    doors = [(r.v0, r.v1) for r in plan.openings if r.label == "door"]
+    assert doors == ([] if head is None else [pytest.approx((0.0, head))])
+
+
+def test_a_picture_that_shows_no_opening_is_warned_of(caplog):
+    rows = tuple(r for r in regions(windows=False) if r.label not in ("door", "shop"))
+    reconstruct(parsed(regions=rows), picture(), rng=rng())
+    assert "facade: shows neither window nor door" in caplog.text
+    caplog.clear()
+    reconstruct(parsed(), picture(), rng=rng())
+    assert not caplog.text
+
+
 def test_what_a_parse_says_of_its_scale_counts():
     tags = {"scale": "height", "metres_per_pixel": 0.2}
     assert elevation(parsed(tags=tags)).eaves == pytest.approx(24.0)

@@ -40,7 +40,7 @@ NAMES: tuple[str, ...] = (
 )
 """Names of the 49 attributes, in the order of the flat vector."""
 
-_ROOF_BIT = {"flat": "flat", "gable": "gable", "shed": "gable", "hip": "hip", "mansard": "hip"}
+ROOF_OF_STYLE = {"flat": "flat", "gable": "gable", "shed": "gable", "hip": "hip", "mansard": "hip"}
 
 
 def building_attributes(building: Building) -> Attributes:
@@ -154,9 +154,9 @@ def _bits(names: tuple[str, ...], seen: set[str], absent: Bit) -> dict[str, Bit]
 
 def _elements(building: Building) -> ElementAttributes:
     roofs = {
-        _ROOF_BIT[box.roof.style]
+        ROOF_OF_STYLE[box.roof.style]
         for box in building.boxes
-        if box.kind == "general" and box.roof is not None and box.roof.style in _ROOF_BIT
+        if box.kind == "general" and box.roof is not None and box.roof.style in ROOF_OF_STYLE
     }
     windows = {
         element.style

@@ -10,6 +10,7 @@ import numpy as np
 from ..artifacts.building import Building, ElementKind, Piece, Side
 from ..artifacts.library import Library, LibraryBuilding, Part, PartSide
 from ..geometry.blocked import wall_of
+from ..geometry.checks import HIGHEST_SILL
 
 DOOR = (0.95, 2.1)  # a door where the library has none (m)
 DOOR_WEIGHT = 3.0  # doors beside the main one are few: drawn this much more often than counted
@@ -125,6 +126,20 @@ def usual_heads(library: Library, entry: LibraryBuilding) -> tuple[float, float]
         ]
         heads.append(max(rows)[1] if rows else usual)
     return heads[0], heads[1]
+
+
+def reachable(
+    rows: Sequence[PartRow], usual: tuple[float, float]
+) -> tuple[list[PartRow], tuple[float, float]]:
+    """Return the substyles and usual heads of which no sill is out of reach (`HIGHEST_SILL`).
+
+    Of windows under high heads (of storeys of 3.5 m, say) those too low for it are left out; where
+    all are, the heads are lowered to the highest of them.
+    """
+    tallest = max(row.height for row in rows if row.kind == "window")
+    ground, upper = (min(head, HIGHEST_SILL + tallest) for head in usual)
+    least = max(ground, upper) - HIGHEST_SILL - 1e-9
+    return [r for r in rows if r.kind != "window" or r.height >= least], (ground, upper)
 
 
 def fitting_door(rows: Sequence[PartRow], front: Sequence[Piece]) -> list[PartRow]:

@@ -21,7 +21,16 @@ from .designed import Designer, designed_pieces
 from .facade_energy import LEAST_TARGET, energy, has_door, side_targets, widths
 from .facade_layout import OPEN
 from .facade_layout import Side as SearchSide
-from .facade_parts import Codes, MainDoor, PartRow, fitting_door, main_doors, part_rows, usual_heads
+from .facade_parts import (
+    Codes,
+    MainDoor,
+    PartRow,
+    fitting_door,
+    main_doors,
+    part_rows,
+    reachable,
+    usual_heads,
+)
 from .facade_site import Solution, facade_of, search_side_of, storey_heads, with_door
 from .garage_doors import garage_doors, garage_sizes
 from .genetic import Search, search_side
@@ -179,8 +188,9 @@ class _Attempt:
         sides = self._standing(wanted)
         front = next(side for side in sides if side.name == "front")
         free = [piece for piece in front.pieces if piece.id not in front.closed]
-        rows, codes = fitting_door(part_rows(library, self.entry), free), Codes()
-        heads = storey_heads(self.building, sides, usual_heads(library, self.entry))
+        parts, usual = reachable(part_rows(library, self.entry), usual_heads(library, self.entry))
+        rows, codes = fitting_door(parts, free), Codes()
+        heads = storey_heads(self.building, sides, usual)
         known = [e for side in sides for piece in side.pieces for e in piece.elements]
         doorless = not any(e.main for e in known)
         targets = side_targets(wanted)

@@ -37,14 +37,15 @@ class Seen:
     head: float
 
 
-class ElementLibrary:
-    """A library ready for use: its buildings' attributes as one matrix (n, 49)."""
+class Likeness:
+    """How like buildings are to one that is asked for, by their attributes (n, 49)."""
 
-    def __init__(self, library: Library) -> None:
-        self.library = library
-        self.matrix = attribute_matrix(row.attributes for row in library.buildings)
-        with np.errstate(invalid="ignore"):
-            spread = np.nanstd(self.matrix, axis=0) if len(self.matrix) > 1 else np.ones(len(NAMES))
+    def __init__(self, matrix: Floats) -> None:
+        self.matrix = matrix
+        known = ~np.isnan(matrix).all(axis=0)
+        spread = np.ones(len(NAMES))
+        if len(matrix) > 1:
+            spread[known] = np.nanstd(matrix[:, known], axis=0)
         self.scale = np.where(spread > 1e-6, spread, 1.0)
 
     def distances(self, wanted: Attributes) -> Floats:
@@ -59,14 +60,26 @@ class ElementLibrary:
         known = np.maximum((~np.isnan(rest)).sum(axis=1), 1)
         return np.asarray(bits + np.nansum(rest, axis=1) / known / 3.001)
 
-    def nearest(
-        self, wanted: Attributes, among: int, rng: np.random.Generator
-    ) -> list[LibraryBuilding]:
+    def nearest(self, wanted: Attributes, among: int, rng: np.random.Generator) -> list[int]:
         """Return those of the `among` most similar buildings with fewest wrong bits, shuffled."""
         distances = self.distances(wanted)
         order = np.argsort(distances, kind="stable")[:among]
         near = order[np.floor(distances[order]) == np.floor(distances[order[0]])]
-        return [self.library.buildings[int(k)] for k in rng.permutation(near)]
+        return [int(k) for k in rng.permutation(near)]
+
+
+class ElementLibrary:
+    """A library ready for use."""
+
+    def __init__(self, library: Library) -> None:
+        self.library = library
+        self._likeness = Likeness(attribute_matrix(row.attributes for row in library.buildings))
+
+    def nearest(
+        self, wanted: Attributes, among: int, rng: np.random.Generator
+    ) -> list[LibraryBuilding]:
+        """Return the most similar buildings: `Likeness.nearest`."""
+        return [self.library.buildings[k] for k in self._likeness.nearest(wanted, among, rng)]
 
     def observed(self, entry: LibraryBuilding, partial: Building) -> LibraryBuilding:
         """Return a library building whose windows are, in style and size, those of `partial`.

@@ -7,8 +7,8 @@ wings run into each other (geometry/solids.py takes the upper envelope of the bo
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -29,11 +29,15 @@ STEEP_STOREY = 2.2  # a mansard's lower slope at most (m)
 
 @dataclass(frozen=True, slots=True)
 class RoofPlan:
-    """Choices that hold for a whole building: styles in order of use, pitch, overhang."""
+    """Choices that hold for a whole building: styles in order of use, pitch, overhang.
+
+    like: roofs of another building, by style as the bits name it, that stand in for these.
+    """
 
     styles: tuple[RoofStyle, ...]
     pitch: float
     overhang: float
+    like: Mapping[str, Roof] = field(default_factory=dict)
 
 
 def draw_roof_plan(element: ElementAttributes, *, rng: np.random.Generator) -> RoofPlan:
@@ -117,6 +121,9 @@ def _roof(
     if style == "flat":
         return Roof("flat")
     direction = _ridge(box, main)
+    like = plan.like.get(style) if box.kind == "general" else None
+    if like is not None:
+        return Roof(like.style, _pitch(box, direction, like.pitch), direction, like.overhang)
     return Roof(style, _pitch(box, direction, plan.pitch), direction, plan.overhang)
 
 

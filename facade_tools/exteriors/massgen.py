@@ -30,6 +30,7 @@ from .mass_roofs import (
 )
 from .mass_search import new_pool, pooled, rank
 from .relations import states_storeys
+from .roof_library import RoofLibrary
 
 log = logging.getLogger("facade_tools.massgen")
 
@@ -49,6 +50,7 @@ def generate_mass(
     candidates: int = 1,
     require: float | None = None,
     model: Model | None = None,
+    library: RoofLibrary | None = None,
 ) -> Iterator[Building]:
     """Yield buildings (boxes and roofs, no facades) whose mass attributes are those wanted.
 
@@ -57,7 +59,8 @@ def generate_mass(
     their unknown heights and roofs are filled in.
     candidates: how many, in order of energy, mutually different (see `mass_candidates`). require:
     raises Infeasible where the best energy is above it, and in any case where there is no mass.
-    model: attributes that `keep` contradicts are drawn from it anew, given the others.
+    model: attributes that `keep` contradicts are drawn from it anew, given the others. library:
+    roofs are mansards, as steep, and their eaves as far out, as those of a building like this.
     `energy.residuals` names the groups that the result misses.
     """
     if keep is not None and (keep.facades or states_storeys(keep)):
@@ -81,7 +84,7 @@ def generate_mass(
         log.warning("%s: energy %.3g; not met: %s", attributes.id, masses[0].energy, missed)
     for number, mass in enumerate(masses, start=1):
         name = attributes.id if candidates == 1 else f"{attributes.id}-{number}"
-        yield _finished(name, attributes, mass, keep, rng=rng)
+        yield _finished(name, attributes, mass, keep, library, rng=rng)
 
 
 def find_masses(
@@ -193,6 +196,7 @@ def _finished(
     attributes: Attributes,
     mass: Mass,
     keep: Building | None,
+    library: RoofLibrary | None,
     *,
     rng: np.random.Generator,
 ) -> Building:
@@ -204,7 +208,10 @@ def _finished(
     added = tower and not (keep and "mass" in keep.complete)
     boxes = with_tower(mass.boxes, rng=rng) if added else mass.boxes
     boxes = under_tower(boxes, _ids(keep), attributes.storey_height) if tower else boxes
-    boxes = roofed(boxes, draw_roof_plan(attributes.element, rng=rng), tower=tower)
+    roofs = draw_roof_plan(attributes.element, rng=rng)
+    if library is not None:
+        roofs = replace(roofs, like=library.like(attributes, rng=rng))
+    boxes = roofed(boxes, roofs, tower=tower)
     chimneys = keep.chimneys if keep else ()
     if "chimney" in wanted and not chimneys:
         chimney = chimney_of(boxes, rng=rng)

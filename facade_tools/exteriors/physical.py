@@ -20,6 +20,7 @@ from .layout import Layout
 MIDDLE = 0.5
 GAP = 1e-3  # how far a porch keeps from the middle line, relative
 LEAST_STOREY = 2.3  # m: of houses with floors above each other
+HIGHEST_STOREY = 5.0  # m: a house higher than its floors allow has another one
 LOWEST = 2.1  # m: lower eaves leave no room for a door
 
 
@@ -69,9 +70,11 @@ def storey_heights(values: tuple[Floats, ...], layout: Layout, typical: float) -
 def _floors_under_eaves(
     values: tuple[Floats, ...], layout: Layout, fixed: tuple[Bits, ...] | None
 ) -> None:
-    """Suit floors and eaves, in place, where a storey would be lower than a person stands.
+    """Suit floors and eaves, in place, where a storey would be no storey.
 
-    A floor for which the eaves are too low is none; where it is given, the eaves are raised.
+    A floor for which the eaves are too low is none; where it is given, the eaves are raised. Eaves
+    too high for the floors that there are (few rows know what they lack) get floors as large as
+    the one below.
     """
     found = Columns(values, layout).get("height", "r1", "r2")
     if not found:
@@ -83,9 +86,19 @@ def _floors_under_eaves(
         name = {2: "r1", 3: "r2"}[floors]
         _put(share, np.where(low, 0.0, share), held, name)
     no_second_floor(values, layout)
+    _floors_that_lack(height, r1, r2, held)
     above = (r1 > ATOM_TOLERANCE) + (np.isfinite(r2) & (r2 > ATOM_TOLERANCE)).astype(np.int64)
     least = np.where(above > 0, LEAST_STOREY * (above + 0.5), LOWEST) * (1 + 1e-5)
     _put(height, np.maximum(height, least), held, "height")
+
+
+def _floors_that_lack(height: Floats, r1: Floats, r2: Floats, held: Columns | None) -> None:
+    """Give houses whose storeys would be above `HIGHEST_STOREY` another floor, in place."""
+    one = (r1 <= ATOM_TOLERANCE) & (height > 1.5 * HIGHEST_STOREY)
+    _put(r1, np.where(one, 1.0, r1), held, "r1")
+    r2[one & (r1 > ATOM_TOLERANCE) & ~np.isfinite(r2)] = 0.0
+    two = (r1 > ATOM_TOLERANCE) & (r2 <= ATOM_TOLERANCE) & (height > 2.5 * HIGHEST_STOREY)
+    _put(r2, np.where(two, 1.0, r2), held, "r2")
 
 
 def settle(

@@ -20,6 +20,7 @@ from .neighbours import Neighbours
 from .network import Network
 from .physical import storey_heights
 from .sampling import draw_block
+from .seen_states import seen_network
 from .serialisation import ModelKey, network_of
 from .shared_values import SharedValues, shared_values
 
@@ -36,7 +37,8 @@ class SampleOptions:
     style: fixes S (from 0). top: only the most probable of many. min_distance: from training rows
     and earlier samples, root mean square standard deviations a coordinate. prefix: of the ids
     `<prefix>-<index>`, counted from `first`. neighbours: whether samples name the training rows
-    nearest to them. smooth: leave out values that training buildings share (`shared_values`).
+    nearest to them. smooth: leave out values that training buildings share (`shared_values`), and
+    draw what none of them shows (`seen_states`).
     """
 
     style: int | None = None
@@ -66,11 +68,12 @@ class Block:
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A model with everything that drawing from it needs."""
+    """A model with everything that drawing from it needs. seen: what whole buildings come from."""
 
     model: Model
     network: Network
     finder: Neighbours
+    seen: Network
     shared: tuple[SharedValues, ...]
     given: Attributes | None
     options: SampleOptions
@@ -82,14 +85,17 @@ def source_of(model: Model, given: Attributes | None, options: SampleOptions) ->
     if options.style is not None and options.style >= len(network.style):
         count = len(network.style)
         raise InvalidInput(f"style {options.style}; expected one of the model's {count}, from 0")
-    finder, shared = _lookups(ModelKey(model))
-    return Source(model, network, finder, () if options.smooth else shared, given, options)
+    finder, seen, shared = _lookups(ModelKey(model))
+    if options.smooth:
+        seen, shared = network, ()
+    return Source(model, network, finder, seen, shared, given, options)
 
 
 @lru_cache(maxsize=4)
-def _lookups(key: ModelKey) -> tuple[Neighbours, tuple[SharedValues, ...]]:
+def _lookups(key: ModelKey) -> tuple[Neighbours, Network, tuple[SharedValues, ...]]:
     network = network_of(key.model)
-    return Neighbours(key.model, network), shared_values(key.model, network)
+    seen = seen_network(key.model, network)
+    return Neighbours(key.model, network), seen, shared_values(key.model, network)
 
 
 def sample_attributes(
@@ -131,7 +137,7 @@ def draw(source: Source, rng: np.random.Generator) -> Iterator[Block]:
     """Yield blocks of complete rows without end."""
     network, options, shared = source.network, source.options, source.shared
     while source.given is None:
-        draws = draw_block(network, rng=rng, style=options.style, shared=shared)
+        draws = draw_block(source.seen, rng=rng, style=options.style, shared=shared)
         yield Block(draws.readings, draws.style, log_density(network, draws.readings))
     found: Iterator[Completion] = completions(
         network, source.given, options.groups, rng=rng, style=options.style, shared=shared

@@ -6,7 +6,7 @@ What no picture shows stays open: the building is partial, its unseen sides are 
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,6 +27,8 @@ from ..errors import InvalidInput
 from ..geometry.boxes import box_rectangles
 from ..geometry.floors import mass_boxes
 from ..geometry.pieces import facade_pieces
+from .axes import on_axes
+from .doors import USUAL, door_head
 from .sides import SideView
 
 log = logging.getLogger("facade_tools.reconstruction")
@@ -35,9 +37,6 @@ STOREY = 3.0  # m: a storey where nothing says how high it is
 STOREYS = (2.2, 6.0)  # m: storeys that a given height may have
 LEAST_DEPTH = 4.0  # m: of a building of which one side only is seen
 LEAST_OPENING = 0.25  # m: smaller ones are left out
-DOOR = (1.0, 2.1)  # m: a main door that nobody sees
-LEAST_DOOR = (0.6, 1.0)  # m: narrower, or with a lower head, it is a fragment and no door
-LOW_DOOR = 1.6  # m: whose head is lower was seen in part, and gets the usual height
 MARGIN = 0.02  # m between an opening and its piece's borders
 
 
@@ -47,7 +46,9 @@ class Assembly:
 
     mass: boxes from a footprint or a building; None: a rectangle as wide as the pictures show.
     storey: height of a storey (m). roof: of all boxes. style: of windows. door: put a main door
-    into the front where none is seen.
+    into the front where none is seen. depth: of that rectangle, from the seen side to the unseen
+    one (m); where it is said, the mass is known. porch: there may be porches, of which pictures
+    do not tell.
     """
 
     mass: Building | None = None
@@ -55,6 +56,8 @@ class Assembly:
     roof: Roof | None = None
     style: str = "unknown"
     door: bool = True
+    depth: float | None = None
+    porch: bool = True
 
 
 def assemble(identity: str, views: Mapping[Side, SideView], known: Assembly) -> Building:
@@ -70,14 +73,15 @@ def assemble(identity: str, views: Mapping[Side, SideView], known: Assembly) -> 
     mass = _mass(identity, views, known, storey, count)
     pieces = facade_pieces(mass)
     facades = {
-        side: Facade(_filled(mass, side, pieces[side], views[side], known))
+        side: Facade(tuple(on_axes(side, _filled(mass, side, pieces[side], views[side], known))))
         for side in SIDES
         if side in views
     }
     if known.door and "front" in facades:
         facades["front"] = _with_door(facades["front"], mass.storey_height)
     tags = {**mass.tags, "assembled": {side: view.storeys for side, view in views.items()}}
-    return replace(mass, id=identity, facades=facades, tags=tags)
+    complete = mass.complete if known.porch else _ordered({*mass.complete, "porch"})
+    return replace(mass, id=identity, facades=facades, complete=complete, tags=tags)
 
 
 def _storey_height(views: Mapping[Side, SideView], known: Assembly) -> float:
@@ -106,10 +110,12 @@ def _mass(
         [_width(views[side], storey) for side in pair if side in views]
         for pair in (("front", "back"), ("left", "right"))
     ]
-    width, depth = (round(sum(s) / len(s), 3) if s else LEAST_DEPTH for s in sizes)
+    unseen = LEAST_DEPTH if known.depth is None else known.depth
+    width, depth = (round(sum(s) / len(s), 3) if s else unseen for s in sizes)
     height = round(count * storey, 3)
     box = Box("main", "general", width / 2, depth / 2, width, depth, height, known.roof)
-    complete = _complete(views, seen=all(map(bool, sizes)), roof=known.roof is not None)
+    seen = known.depth is not None or all(map(bool, sizes))
+    complete = _complete(views, seen=seen, roof=known.roof is not None)
     return Building(identity, (box,), storey_height=storey, partial=True, complete=complete)
 
 
@@ -141,10 +147,13 @@ def _fitted(known: Assembly, storey: float, count: int) -> Building:
     storey = min(round(storey, 6), round(1.99 * lowest, 6))
     boxes = tuple(_completed(box, round(count * storey, 3), known.roof) for box in mass.boxes)
     roofs = all(box.roof is not None for box in boxes)
-    parts: set[str] = {"mass", *mass.complete} | ({"roof"} if roofs else set())
-    order: tuple[MassPart, ...] = ("mass", "garage", "porch", "roof")
-    complete = tuple(part for part in order if part in parts)
+    complete = _ordered({"mass", *mass.complete} | ({"roof"} if roofs else set()))
     return replace(mass, boxes=boxes, storey_height=storey, partial=True, complete=complete)
+
+
+def _ordered(parts: Collection[str]) -> tuple[MassPart, ...]:
+    order: tuple[MassPart, ...] = ("mass", "garage", "porch", "roof")
+    return tuple(part for part in order if part in parts)
 
 
 def _completed(box: Box, height: float, roof: Roof | None) -> Box:
@@ -212,9 +221,10 @@ def _openings(view: SideView, width: float, storey: float) -> list[_Opening]:
             low, high = ((ground - y) / (ground - ceiling) * storey for y in (y1, y0))
             place = ((x0 - view.x0) * across, (x1 - view.x0) * across)
             if kind == "door":
-                if place[1] - place[0] < LEAST_DOOR[0] or high < LEAST_DOOR[1]:
+                head = door_head(place[1] - place[0], high, storey)
+                if head is None:
                     continue
-                high = high if high >= LOW_DOOR else min(DOOR[1], 0.9 * storey)
+                high = head
             out.append(_Opening(kind, floor, *place, max(low, 0.0), min(high, storey)))
     return sorted(out, key=lambda o: (o.kind, -(o.right - o.left) * (o.high - o.low)))
 
@@ -299,15 +309,15 @@ def _with_door(front: Facade, storey: float) -> Facade:
     for piece in sorted(ground, key=lambda p: -p.width):
         place = _free_place(piece, storey)
         if place is not None:
-            height = round(min(DOOR[1], 0.9 * piece.height), 4)
-            guess = Element("door", "plain", place, 0.0, DOOR[0], height, main=True)
+            height = round(min(USUAL[1], 0.9 * piece.height), 4)
+            guess = Element("door", "plain", place, 0.0, USUAL[0], height, main=True)
             return _exchanged(front, piece, None, guess)
     return front
 
 
 def _free_place(piece: Piece, storey: float) -> float | None:
     """Return where a door fits between the windows that reach down to it, nearest the middle."""
-    width, height = DOOR[0], min(DOOR[1], 0.9 * storey)
+    width, height = USUAL[0], min(USUAL[1], 0.9 * storey)
     middle: float = (piece.width - width) / 2
     taken = sorted((e.u, e.u + e.width) for e in piece.elements if e.v < height)
     places: list[float] = []

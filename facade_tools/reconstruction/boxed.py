@@ -17,6 +17,7 @@ from ..geometry.detail_boxes import side_frame
 from ..geometry.pieces import facade_pieces
 from ..geometry.polygons import shape_of
 from ..geometry.rectilinear import partition
+from .axes import on_axes
 from .drawing import opening_of
 from .engine import Derived, Leaf
 from .volumes import Volume, standing
@@ -46,12 +47,19 @@ class Placed:
 
 
 def derived_building(
-    derived: Derived, identity: str, storey_height: float, known: Iterable[Side] = ()
+    derived: Derived,
+    identity: str,
+    storey_height: float,
+    known: Iterable[Side] = (),
+    *,
+    axes: bool = False,
 ) -> Building:
     """Return the building of a derivation; one without an entrance is partial.
 
     Oblique walls become stairs; dormers, balconies and what does not stand on the ground are left
-    out. known: sides whose elements were observed. Raises InvalidInput where there is no volume.
+    out. known: sides whose elements were observed. axes: whether windows come from a parse, and
+    those nearly above one another stand on common axes. Raises InvalidInput where there is no
+    volume.
     """
     volumes = standing(derived.volumes)
     boxes = tuple(_boxes(volumes))
@@ -62,7 +70,10 @@ def derived_building(
     bare = Building(identity, boxes, {}, storey)
     sides = frozenset(known)
     placed = [p for leaf in derived.leaves for p in _placed(leaf, sides)]
-    facades = {side: Facade(tuple(pieces)) for side, pieces in _filled(bare, placed).items()}
+    facades = {
+        side: Facade(tuple(on_axes(side, pieces) if axes else pieces))
+        for side, pieces in _filled(bare, placed).items()
+    }
     building = _sound(replace(bare, facades=facades))
     if any(element.main for element in _elements(building)):
         return building

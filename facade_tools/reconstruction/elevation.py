@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..artifacts.parse import LABELS, Parse, Region
 from ..errors import InvalidInput
 from ..geometry.arrays import Floats
+from .doors import door_head
 
 STOREY = 3.0  # metres, where nobody says
 STOREYS = 6.0  # in a picture whose parse has no floors
@@ -248,7 +249,10 @@ def _joined(rects: Sequence[Rect]) -> list[Rect]:
 
 
 def _openings(low: Sequence[Rect], balconies: Sequence[Rect], frame: Rect) -> Iterator[Rect]:
-    """Yield doors and windows, windows down to the floor of the balcony before them."""
+    """Yield doors and windows, windows down to the floor of the balcony before them.
+
+    Fragments of doors are left out, low ones get the usual height.
+    """
     for rect in low:
         if rect.label not in ("window", "door"):
             continue
@@ -256,6 +260,11 @@ def _openings(low: Sequence[Rect], balconies: Sequence[Rect], frame: Rect) -> It
             rect = replace(rect, label="window")
         if rect.label == "window":
             rect = _lowered(rect, balconies)
+        else:
+            head = door_head(rect.width, rect.v1, frame.v1)
+            if head is None:
+                continue
+            rect = replace(rect, v1=head)
         cut = _cut(rect, frame)
         if _large(cut):
             yield cut

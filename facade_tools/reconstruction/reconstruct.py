@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
@@ -31,6 +32,8 @@ from .surfaces import (
     without_rim,
 )
 from .widening import widened
+
+log = logging.getLogger("facade_tools.reconstruction")
 
 SQUEEZED = 0.5  # of its width: a facade narrower than that is not put on its wall
 DEPTH = 12.0  # metres, of the default footprint
@@ -75,7 +78,7 @@ class Reconstruction:
     def building(self) -> Building:
         """Return the parametric building; what the front shows is known."""
         made = derived_building(
-            self.derived, self.name, self.plan.storey, ["front"] if self.seen else []
+            self.derived, self.name, self.plan.storey, ["front"] if self.seen else [], axes=True
         )
         colors = self.surfaces.colors
         own = Colors(colors["wall"], "#efeae0", colors["roof"], colors["door"])
@@ -106,6 +109,8 @@ def reconstruct(
     labels = label_map(parse)
     picture = without_rim(_rectified(photo, parse, labels.shape))
     plan = elevation(parse, ask.storey_height, ask.height)
+    if not plan.openings:
+        log.warning("%s: shows neither window nor door", parse.id)
     shown = picture, labels, plan
     more, squeeze = None, 1.0
     if lots:

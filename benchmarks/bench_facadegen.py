@@ -1,7 +1,8 @@
 """Figures of `facade facadegen`: `python benchmarks/bench_facadegen.py [NAME]`.
 
-NAME: sizing, held-out, least, completion, ablation FOLDER, chain MASSES; without it all but chain.
-Held-out buildings are sample houses of another seed than those of the shipped library.
+NAME: sizing, held-out [FOLDER], least, completion, ablation [FOLDER], chain MASSES; without it all
+but chain. Held-out buildings are sample houses of another seed than those of the shipped library.
+FOLDER takes buildings to look at.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterable
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -53,17 +55,26 @@ def finished(mass: Building, **options: object) -> list[Building]:
     return list(generate_facades(mass, FacadeOptions(**options), rng=rng))  # type: ignore[arg-type]
 
 
+def write_buildings(path: Path, houses: Iterable[Building]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_bytes(path, b"".join(dump_line(encode(house)) for house in houses))
+
+
 def row(name: str, value: str, wanted: str) -> None:
     print(f"{name:<58} {value:>14}   {wanted}")
 
 
-def bench_held_out() -> None:
-    """Targets of held-out buildings on their own masses."""
-    houses = [undressed(house) for house in held_out(20)]
+def bench_held_out(folder: str = "build/held-out") -> None:
+    """Targets of held-out buildings on their own masses; writes each building and its copy."""
+    originals = held_out(20)
+    houses = [undressed(house) for house in originals]
     finished(houses[0])  # compile
     start = time.process_time()
     done = [finished(house)[0] for house in houses]
     seconds = (time.process_time() - start) / len(houses)
+    copies = [replace(house, id=f"{house.id}-made") for house in done]
+    pairs_made = (house for pair in zip(originals, copies, strict=True) for house in pair)
+    write_buildings(Path(folder) / "pairs.jsonl", pairs_made)
     energies = np.array([house.energy.facade for house in done])
     pairs = [
         (value, target)
@@ -335,9 +346,9 @@ def bench_ablation(folder: str = "build/ablation") -> None:
             " ".join(f"{e:.3f}" for e in errors),
             "",
         )
-        path = Path(folder) / f"{name.replace(' ', '-')}.jsonl"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_bytes(path, b"".join(dump_line(encode(house)) for house in done))
+        kind = name.replace(" ", "-")
+        named = (replace(house, id=f"{house.id} {kind}") for house in done)
+        write_buildings(Path(folder) / f"{kind}.jsonl", named)
 
 
 def difference(house: Building, mass: Building, key: str) -> np.ndarray:
@@ -386,9 +397,10 @@ BENCHES = {
 
 
 def main() -> None:
-    name, *rest = sys.argv[1:] or ["all"]
-    chosen = [name] if name in BENCHES else [key for key in BENCHES if key != "chain"]
-    for key in chosen:
+    name, *rest = sys.argv[1:] or [""]
+    if name and name not in BENCHES:
+        sys.exit(__doc__)
+    for key in [name] if name else [key for key in BENCHES if key != "chain"]:
         BENCHES[key](*rest)
 
 

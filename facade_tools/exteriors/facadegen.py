@@ -10,12 +10,12 @@ from itertools import groupby, islice
 import numpy as np
 
 from ..artifacts.attributes import WINDOW_BITS, Attributes, FacadeAttributes
-from ..artifacts.building import SIDES, Box, Building, Element, Energy, Facade, Piece, Side
+from ..artifacts.building import SIDES, Building, Element, Energy, Facade, Piece, Side
 from ..artifacts.library import LibraryBuilding
 from ..errors import InvalidInput
 from ..geometry.arrays import Floats, Rectangles
 from ..geometry.blocked import blocked_walls
-from ..geometry.garage_walls import garage_stretch
+from ..geometry.garage_walls import house_beside
 from ..geometry.pieces import facade_pieces
 from .attributes import building_attributes
 from .designed import Designer, designed_pieces
@@ -40,7 +40,6 @@ TRIES = 3  # walls of one rank in which the main door is tried where the first d
 ENOUGH = 5e-3  # energy over its lower bound that needs no elements of another library building
 GOOD = 2e-3  # energy of a side over its lower bound that needs no further try
 MAIN_DOOR_AREA = 2.0  # set aside before the garage door is chosen (m²)
-HOUSE_BESIDE = 1.6  # m of wall beside a garage in its plane that take a door or a window
 MISSED = 0.05  # relative difference from which an attribute counts as not met
 
 
@@ -265,17 +264,9 @@ def _with_garage_doors(
     own = {
         p.id
         for p in done.pieces
-        if p.id in doors
-        and p.box in garages
-        and _house_beside(garages[p.box], side.name, p) < HOUSE_BESIDE
+        if p.id in doors and p.box in garages and not house_beside(garages[p.box], side.name, p)
     }
     return replace(done, closed=side.closed | own)
-
-
-def _house_beside(garage: Box, side: Side, piece: Piece) -> float:
-    """Return how much of a garage's piece (m) has something else behind it."""
-    stretch = garage_stretch(garage, side, piece)
-    return 0.0 if stretch is None else piece.width - (stretch[1] - stretch[0])
 
 
 def _area(pieces: Sequence[Piece], ratio: float | None) -> float:

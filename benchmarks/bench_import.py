@@ -1,8 +1,8 @@
 """Rates of every reader (by CPU time), the memory of a stream, what became of each real set.
 
-    python benchmarks/bench_import.py [--data FOLDER] [--stream 100000]
+    python benchmarks/bench_import.py [--data FOLDER] [--no-sets] [--stream 10000]
 
-FOLDER holds the real sets of buildings, one folder each. Streams of 100,000 take some 10 minutes.
+FOLDER holds the real sets of buildings, one folder each (as SETS names them).
 """
 
 from __future__ import annotations
@@ -59,7 +59,10 @@ def real_sets(data: Path) -> None:
     print(f"{'set':<18}{'read':>6}{'refused':>9}{'valid':>7}{'median res.':>13}{'/s':>9}")
     applied = {}
     for name, (folder, pattern) in SETS.items():
-        paths = sorted((data / "buildings" / folder).glob(pattern))
+        paths = sorted((data / folder).glob(pattern))
+        if not paths:
+            print(f"{name:<18}  no {pattern} in {data / folder}")
+            continue
         notes: Counter[str] = Counter()
         start = time.process_time()
         found = list(artifacts(paths, notes))
@@ -184,7 +187,7 @@ def streams(count: int) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--data", type=Path, default=ROOT.parent / "shared" / "data")
+    parser.add_argument("--data", type=Path, default=ROOT.parent / "shared" / "data" / "buildings")
     parser.add_argument("--no-sets", action="store_true", help="only the streams")
     parser.add_argument("--stream", type=int, default=10_000)
     arguments = parser.parse_args()

@@ -59,7 +59,7 @@ def row(houses: Sequence[Building], group: str | None) -> tuple[list[Building], 
 
 def main() -> None:
     parser = argparse.ArgumentParser()
-    parser.add_argument("-o", "--output", default="ablation.png")
+    parser.add_argument("-o", "--output", default="build/mass-ablation.png")
     parser.add_argument("--per-style", type=int, default=3)
     options = parser.parse_args()
     houses = unseen_houses(options.per_style)
@@ -79,7 +79,9 @@ def main() -> None:
             bare = replace(column[k], facades={})
             pictures.append(render(building_sketch(bare), view))
             labels.append(name if name in ("original", "all seven") else f"without {name}")
-    Path(options.output).write_bytes(write_png(contact_sheet(pictures, labels, len(columns))))
+    output = Path(options.output)
+    output.parent.mkdir(parents=True, exist_ok=True)
+    output.write_bytes(write_png(contact_sheet(pictures, labels, len(columns))))
 
 
 if __name__ == "__main__":

@@ -22,7 +22,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from peers_density import Columns, columns, draw_products, fit_products, fit_stepmix
+from peers_density import (
+    Columns,
+    columns,
+    draw_products,
+    fit_products,
+    fit_stepmix,
+    has_stepmix,
+)
 from scipy.optimize import linear_sum_assignment
 from sklearn.ensemble import HistGradientBoostingClassifier
 from sklearn.metrics import roc_auc_score
@@ -159,7 +166,8 @@ def main() -> None:
     # A garage's measures are never observed in these data: where a real house has none, a
     # sample's would give it away beside the bit that already says so.
     shown = (np.isfinite(real) & (real != -9.0)).mean(axis=0) > 0.01
-    for name in options.models.split(","):
+    names = [n for n in options.models.split(",") if n != "StepMix" or has_stepmix()]
+    for name in names:
         for tag, fake in fakes(name, train, len(test), layout):
             masked = np.where(np.isnan(real), np.nan, fake)
             rng = np.random.default_rng(1)

@@ -210,6 +210,24 @@ def test_no_overhang_runs_into_another_part_of_the_roof():
     assert met > 20
 
 
+def test_the_eaves_between_a_tower_and_a_wing_stay():
+    """Hips whose common border differs in its last digit: GEOS took one for the overlap of both."""
+    boxes = (
+        Box("main", "general", 5.65, 6.0, 11.3, 12.0, 6.4, Roof("hip", 43.0, "y", 0.35)),
+        Box("tower", "general", 0.6, 0.6, 3.0, 3.0, 9.4, Roof("cone", 57.0, "x", 0.2)),
+        Box("cross", "general", 11.3, 7.1, 2.0, 4.6, 6.4, Roof("gable", 43.0, "x", 0.35)),
+    )
+    solid = building_solid(Building("h", boxes))
+    slabs = list(_slabs(solid, {"main": 0.35, "tower": 0.2, "cross": 0.35}))
+    left = trimmed(slabs, THICKNESS)
+    (front,) = [
+        rings
+        for slab, rings in zip(slabs, left, strict=True)
+        if np.allclose(slab.plane, (0.0, np.tan(np.radians(43.0)), 6.4), atol=1e-6)
+    ]
+    assert min(float(part[0][:, 1].min()) for part in front) == pytest.approx(-0.35)
+
+
 def points_in(shape, rng):
     if shape.area < 1e-2:
         return []

@@ -48,9 +48,18 @@ def test_no_tracked_page_names_a_machine():
         )
 
 
+def blocks(page: Path) -> list[str]:
+    """Return the blocks of a page that hold commands, fenced or indented."""
+    text = page.read_text(encoding="utf-8")
+    fenced = re.findall(r"```(?:sh|bash|console)\n(.*?)```", text, re.S)
+    rest = re.sub(r"```.*?```", "", text, flags=re.S)
+    indented = re.findall(r"(?:^ {4}\S.*\n(?:^ {4}.*\n)*)", rest, re.M)
+    return fenced + [re.sub(r"^ {4}", "", block, flags=re.M) for block in indented]
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_commands_in_the_docs_are_commands(page):
-    for block in re.findall(r"```(?:sh|bash|console)\n(.*?)```", page.read_text(), re.S):
+    for block in blocks(page):
         for stage in re.findall(r"(?:^|[|&;]\s*|\$ )facade (?:-\S+ )*([a-z][a-z-]*)", block, re.M):
             assert stage in STAGES, f"{page.name}: facade {stage}"
 
@@ -77,7 +86,7 @@ def test_public_functions_tell_what_they_raise():
 
 def _commands(page):
     """Yield stage and options of every `facade` command that a page's blocks show."""
-    for block in re.findall(r"```(?:sh|bash|console)\n(.*?)```", page.read_text(), re.S):
+    for block in blocks(page):
         for command in re.split(r"[|;&\n]", block.replace("\\\n", " ")):
             match = re.match(r"\s*\$?\s*facade (?:-\S+ )*([a-z][a-z-]*)(.*)", command)
             if match and match.group(1) in STAGES:

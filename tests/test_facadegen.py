@@ -140,6 +140,35 @@ def test_garage_under_an_upper_storey_gets_a_door_beside_the_entrance():
     assert entrance[1].u + entrance[1].width < min(e.u for _, e in doors)
 
 
+def test_house_in_one_plane_with_its_garage_has_the_main_door_beside_it():
+    boxes = (
+        Box("main", "general", 6, 6, 12, 6, 6.0, Roof("hip")),
+        Box("wing", "general", 2.75, 4.4, 5.5, 8.8, 2.7, Roof("gable", direction="y")),
+        Box("garage", "garage", 8.75, 3.2, 6.5, 6.4, 2.7, Roof("gable", direction="y")),
+    )
+    (house,) = made(bare(replace(sample("colonial"), boxes=boxes)))
+    assert list(building_problems(house)) == []
+    (entrance,) = [e for _, _, e in elements(house) if e.main]
+    doors = [e for _, _, e in elements(house) if e.kind == "garage-door"]
+    assert doors
+    assert all(e.u >= 5.5 for e in doors)
+    assert entrance.u + entrance.width <= 5.5
+
+
+def test_porch_beside_a_garage_shelters_the_door_in_the_wall_of_both():
+    boxes = (
+        Box("main", "general", 7.65, 4.8, 15.3, 7.4, 5.4, Roof("gable")),
+        Box("wing", "general", 7.24, 2.05, 1.72, 4.1, 2.6, Roof("gable", direction="y")),
+        Box("garage", "garage", 3.48, 3.4, 5.8, 6.8, 2.6, Roof("gable", direction="y")),
+        Box("porch", "porch", 7.7, 0.3, 2.6, 1.5, 2.45, Roof("gable", direction="y")),
+    )
+    (house,) = made(bare(replace(sample("colonial"), boxes=boxes)))
+    assert list(building_problems(house)) == []
+    ((piece, door),) = [(piece, e) for _, piece, e in elements(house) if e.main]
+    assert piece.box == "garage"
+    assert 6.4 < piece.origin[0] + door.u + door.width / 2 < 9.0
+
+
 @pytest.mark.parametrize("deeper", [0.0, 0.4])
 def test_main_door_stands_behind_the_porch_whatever_the_targets(deeper):
     """Also where sampled measures put the porch at one end, or some way into the house."""

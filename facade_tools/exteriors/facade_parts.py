@@ -11,6 +11,7 @@ from ..artifacts.building import Building, ElementKind, Piece, Side
 from ..artifacts.library import Library, LibraryBuilding, Part, PartSide
 from ..geometry.blocked import wall_of
 from ..geometry.checks import HIGHEST_SILL
+from ..geometry.garage_walls import house_beside
 
 DOOR = (0.95, 2.1)  # a door where the library has none (m)
 DOOR_WEIGHT = 3.0  # doors beside the main one are few: drawn this much more often than counted
@@ -167,7 +168,7 @@ def main_doors(
     (then within the porch), in a wide wall before a narrow one.
     """
     sub, half = len(rows) - 1, rows[-1].width / 2 + BESIDE_DOOR
-    kinds = {box.id: box.kind for box in building.boxes}
+    boxes = {box.id: box for box in building.boxes}
     found = []
     for p, piece in enumerate(pieces):
         tall = piece.height >= rows[-1].height + OVER_DOOR - 1e-9
@@ -175,10 +176,11 @@ def main_doors(
             continue
         porch = _porch_range(building, piece) if side == "front" else None
         low, high = half, piece.width - half
-        garage = kinds[piece.box] != "general"
+        garage = boxes[piece.box].kind != "general"
         found.append(MainDoor(p, low, high, sub, 0.3, (garage, True)))
         if porch is not None and max(low, porch[0]) <= min(high, porch[1]):
             low, high = max(low, porch[0]), min(high, porch[1])
+            garage = garage and not house_beside(boxes[piece.box], side, piece)
             found.append(MainDoor(p, low, high, sub, 0.6, (garage, False)))
     return sorted(found, key=lambda door: (door.rank, -pieces[door.piece].width))
 

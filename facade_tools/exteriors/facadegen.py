@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import groupby, islice
 
@@ -15,6 +15,7 @@ from ..artifacts.library import LibraryBuilding
 from ..errors import InvalidInput
 from ..geometry.arrays import Floats, Rectangles
 from ..geometry.blocked import blocked_walls
+from ..geometry.garage_walls import house_beside
 from ..geometry.pieces import facade_pieces
 from .attributes import building_attributes
 from .designed import Designer, designed_pieces
@@ -224,8 +225,7 @@ class _Attempt:
         }
         sizes = garage_sizes(library, self.entry)
         doors = garage_doors(self.building, free, blocked, sizes, room)
-        garages = {box.id for box in self.building.boxes if box.kind == "garage"}
-        return [_with_garage_doors(side, doors, garages) for side in sides]
+        return [_with_garage_doors(side, doors, self.building) for side in sides]
 
     def _main_doors(
         self, standing: Standing, plain: SearchSide, rows: Sequence[PartRow]
@@ -263,11 +263,19 @@ def _with_elements(side: Standing, elements: Mapping[str, tuple[Element, ...]]) 
 
 
 def _with_garage_doors(
-    side: Standing, doors: Mapping[str, tuple[Element, ...]], garages: Collection[str]
+    side: Standing, doors: Mapping[str, tuple[Element, ...]], building: Building
 ) -> Standing:
-    """Return a side with garage doors: a garage's own wall takes no more, a house's wall does."""
+    """Return a side with garage doors: a garage's own wall takes no more, a house's wall does.
+
+    Where house and garage stand in one plane the wall is of both, though it names the garage.
+    """
     done = _with_elements(side, doors)
-    own = {p.id for p in done.pieces if p.id in doors and p.box in garages}
+    garages = {box.id: box for box in building.boxes if box.kind == "garage"}
+    own = {
+        p.id
+        for p in done.pieces
+        if p.id in doors and p.box in garages and not house_beside(garages[p.box], side.name, p)
+    }
     return replace(done, closed=side.closed | own)
 
 

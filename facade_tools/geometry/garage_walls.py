@@ -6,6 +6,7 @@ from ..artifacts.building import Box, Building, Piece, Side
 from .blocked import Wall, wall_of
 
 NEAR = 1e-4  # what is closer than this is in the same place (m)
+HOUSE_BESIDE = 1.6  # m of wall beside a garage in its plane that take a door or a window
 
 Stretch = tuple[float, float]  # first and last u of a piece (m)
 
@@ -22,6 +23,12 @@ def garage_stretch(garage: Box, side: Side, piece: Piece) -> Stretch | None:
     >>> garage_stretch(garage, "left", Piece("left-1", "house", (0, 6, 0), 6, 3))
     """
     return None if piece.origin[2] > NEAR else stretch_of(garage, side, piece)
+
+
+def house_beside(garage: Box, side: Side, piece: Piece) -> bool:
+    """Tell whether a piece that names a garage is the house's wall, too: both in one plane."""
+    stretch = garage_stretch(garage, side, piece)
+    return stretch is not None and piece.width - (stretch[1] - stretch[0]) >= HOUSE_BESIDE
 
 
 def stretch_of(box: Box, side: Side, piece: Piece) -> Stretch | None:

@@ -136,7 +136,7 @@ def _read_options(options: ParseOptions) -> ReadOptions:
 
 
 def both_methods(options: ReadOptions) -> Method:
-    """Return TSKP10's method with KSTTP09's windows as a second opinion."""
+    """Return TSKP10's method with KSTTP09's windows, found from both, as a second opinion."""
     from facade_tools.reconstruction.mrf import mrf_method
     from facade_tools.segmentation.parsing import forest_method
 

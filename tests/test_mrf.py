@@ -19,6 +19,7 @@ from facade_tools.reconstruction.evidence import (
     profiles,
     repeated_columns,
     window_evidence,
+    with_belief,
 )
 from facade_tools.reconstruction.lines import differences, earth_movers, segments
 from facade_tools.reconstruction.mrf import Scale, read_facade
@@ -30,7 +31,9 @@ WALL, GLASS, SKY, SHOP = (206, 190, 160), (50, 60, 74), (180, 205, 240), (90, 40
 FLOOR, STRIPE = 60, 70  # pixels
 
 
-def drawn(rows: int, columns: int, seed: int = 0, sky: int = 40) -> np.ndarray:
+def drawn(
+    rows: int, columns: int, seed: int = 0, sky: int = 40, glass: tuple[int, ...] = GLASS
+) -> np.ndarray:
     """A wall of windows over a shop, under the sky; 20 pixels a metre."""
     height, width = sky + rows * FLOOR + 80, columns * STRIPE + 30
     picture = np.empty((height, width, 3), np.float64)
@@ -40,7 +43,7 @@ def drawn(rows: int, columns: int, seed: int = 0, sky: int = 40) -> np.ndarray:
     for row in range(rows):
         for column in range(columns):
             y, x = sky + row * FLOOR + 14, 30 + column * STRIPE
-            picture[y : y + 36, x : x + 26] = GLASS
+            picture[y : y + 36, x : x + 26] = glass
     picture += np.random.default_rng(seed).normal(0, 6, picture.shape)
     return np.clip(cv2.GaussianBlur(picture, (0, 0), 0.8), 0, 255).astype(np.uint8)
 
@@ -217,6 +220,37 @@ def test_the_rim_of_a_rectified_picture_says_nothing():
     assert evidence.seen[:, 40:].mean() > 0.99
 
 
+def test_a_belief_is_evidence_beside_the_pictures():
+    pixels = drawn(4, 4)
+    pixels[:, :25] = 0
+    evidence = window_evidence(pixels)
+    told = np.zeros((len(pixels) // 2, pixels.shape[1] // 2), np.float32)
+    np.testing.assert_array_equal(with_belief(evidence, told), evidence.plane)
+    told[:, 40:44] = 1.0
+    more = with_belief(evidence, told) - evidence.plane
+    assert (more[:, :25] == 0).all()
+    assert more[:, 81:87].min() > 0.5
+    assert more[:, 92:96].max() < 0
+
+
+def window_share(one: np.ndarray, other: np.ndarray) -> float:
+    """Return the intersection over union of the windows of two label maps."""
+    a, b = (labels == LABELS.index("window") for labels in (one, other))
+    return (a & b).sum() / (a | b).sum()
+
+
+def test_windows_that_hardly_show_are_found_where_another_believes_in_them():
+    """The scale stays as it was told or as the picture alone shows it."""
+    true = read(drawn(4, 4)).labels
+    windows = (true == LABELS.index("window")).astype(np.float32)
+    bare = drawn(4, 4, glass=WALL)
+    told = Scale(height=16.0)
+    assert window_share(read(bare, told).labels, true) < 0.4
+    assert window_share(read(bare, told, windows=windows).labels, true) > 0.7
+    scales = [read(bare, windows=w).parse.tags for w in (None, windows)]
+    assert scales[0] == scales[1]
+
+
 def test_the_period_of_a_rhythm():
     assert period(np.sin(np.arange(240) * 2 * np.pi / 30)) == pytest.approx(30, abs=1)
     assert period(np.zeros(100)) == 20
@@ -301,7 +335,7 @@ def thin_roof(sky: int, height: int, relief: float) -> tuple[Facade, list[Band]]
         bands.append(Band("floor", y1 - 30, y1, y1 - 22, y1 - 6, 1.0, 0.3))
     foot = sky + height
     bands.append(Band("roof", sky, foot, foot, foot, 0.0, 0.0))
-    facade = Facade(np.zeros((n, 60, 3)), plane, np.zeros(n + 1), sky, 30)
+    facade = Facade(np.zeros((n, 60, 3)), plane, plane, np.zeros(n + 1), sky, 30)
     return facade, bands
 
 

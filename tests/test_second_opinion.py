@@ -17,7 +17,7 @@ from facade_tools.reconstruction.mrf import mrf_method
 from facade_tools.segmentation.classifier import default, save
 from facade_tools.segmentation.painting import render_facade
 from facade_tools.segmentation.parsing import forest_method
-from facade_tools.segmentation.second_opinion import WEIGHT, exposed, moved
+from facade_tools.segmentation.second_opinion import FIRM, MILD, doubt, exposed, moved
 
 CLASSES = ("window", "wall", "sky")
 WINDOW, WALL = LABELS.index("window"), LABELS.index("wall")
@@ -34,30 +34,50 @@ def half(shape=(4, 6)):
     return labels
 
 
-def test_a_lost_classifier_takes_the_whole_weight():
-    out = moved(beliefs(0.4, 0.4, 0.2), CLASSES, half())
-    odds = np.log(out[0] / out[1])
-    np.testing.assert_allclose(odds[:, :3], 2 * WEIGHT, rtol=1e-5)
-    np.testing.assert_allclose(odds[:, 3:], -2 * WEIGHT, rtol=1e-5)
+def leaning(shape=(4, 6)):
+    """Beliefs that lean towards windows where `half` has them."""
+    out = beliefs(0.4, 0.4, 0.2, shape)
+    out[0, :, : shape[1] // 2] += 0.02
+    out[1, :, : shape[1] // 2] -= 0.02
+    return out
+
+
+def odds(belief):
+    return np.log(belief[0] / belief[1])
+
+
+def test_a_second_reading_moves_windows_and_walls():
+    before = leaning()
+    out = moved(before, CLASSES, half(), 1.0)
+    shift = odds(out) - odds(before)
+    gain, loss, walls = FIRM
+    np.testing.assert_allclose(shift[:, :3], gain + walls, rtol=1e-4)
+    np.testing.assert_allclose(shift[:, 3:], -loss - walls, rtol=1e-4)
     np.testing.assert_allclose(out.sum(axis=0), 1, rtol=1e-5)
+    less = odds(moved(before, CLASSES, half(), 0.5)) - odds(before)
+    np.testing.assert_allclose(less, shift / 2, rtol=1e-4)
+    np.testing.assert_allclose(moved(before, CLASSES, half(), 0.0), before, rtol=1e-6)
 
 
-def test_a_sure_classifier_is_not_moved():
-    sure = beliefs(0.97, 0.02, 0.01)
-    np.testing.assert_allclose(moved(sure, CLASSES, half()), sure, rtol=1e-6)
+def test_a_reading_whose_windows_are_elsewhere_moves_less():
+    gain, loss, walls = MILD
+    shift = odds(moved(leaning(), CLASSES, half()[:, ::-1], 1.0)) - odds(leaning())
+    np.testing.assert_allclose(shift[:, 3:], gain + walls, rtol=1e-4)
+    np.testing.assert_allclose(shift[:, :3], -loss - walls, rtol=1e-4)
+    nothing = np.full((4, 6), WALL, np.uint8)
+    shift = odds(moved(leaning(), CLASSES, nothing, 1.0)) - odds(leaning())
+    np.testing.assert_allclose(shift, -loss - walls, rtol=1e-4)
 
 
-def test_between_the_weight_grows_with_doubt():
-    """Mean entropies of 0.35 and 0.44 nats stand between sure and lost."""
-    shifts = []
-    for p in (0.90, 0.87):
-        out = moved(beliefs(p, 1 - p - 0.01, 0.01), CLASSES, half())
-        shifts.append(np.log(out[0, 0, 0] / out[1, 0, 0]) - np.log(p / (1 - p - 0.01)))
-    assert 0 < shifts[0] < shifts[1] < 2 * WEIGHT
+def test_the_weight_grows_with_doubt():
+    """Mean entropies of 0.15, 0.40, 0.44 and 1.05 nats."""
+    weights = [doubt(beliefs(p, 0.99 - p, 0.01)) for p in (0.97, 0.885, 0.87, 0.5)]
+    assert weights[0] == 0 < weights[1] < weights[2] < weights[3]
+    assert doubt(beliefs(0.4, 0.4, 0.2)) == 1
 
 
 def test_labels_of_another_size_and_a_missing_class():
-    out = moved(beliefs(0.4, 0.4, 0.2)[:2], ("window", "sky"), half((40, 60)))
+    out = moved(leaning()[:2], ("window", "sky"), half((40, 60)), 1.0)
     assert (out[0, :, :3] > 0.5).all()
     assert (out[0, :, 3:] < 0.5).all()
     np.testing.assert_allclose(out.sum(axis=0), 1, rtol=1e-5)
@@ -70,7 +90,7 @@ def photo_of(seed):
 
 
 def test_without_a_solution_of_its_own_the_second_says_nothing():
-    def none(photo, identity, *, rng, mask=None):
+    def none(photo, identity, *, rng, mask=None, windows=None):
         raise Infeasible("nothing")
 
     photo, _ = photo_of(0)
@@ -87,6 +107,20 @@ def test_the_classifiers_own_labels_stay_its_own():
         for second in (None, mrf_method(ReadOptions()))
     )
     np.testing.assert_array_equal(alone.raw, beside.raw)
+
+
+def test_the_second_is_told_the_belief_in_windows():
+    told = []
+
+    def listening(photo, identity, *, rng, mask=None, windows=None):
+        told.append(windows)
+        raise Infeasible("nothing")
+
+    photo, labels = photo_of(4)
+    forest_method(ReadOptions(), second=listening)(photo, "a", rng=np.random.default_rng(0))
+    (windows,) = told
+    assert windows.shape == labels.shape
+    assert windows[labels == WINDOW].mean() > 0.5 > 0.2 > windows[labels == WALL].mean()
 
 
 @pytest.fixture(scope="module")

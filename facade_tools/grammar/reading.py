@@ -52,6 +52,22 @@ class Method(Protocol):
         ...
 
 
+class SecondMethod(Protocol):
+    """A method that can be told what another one believes: `windows`, 0..1, of any size."""
+
+    def __call__(
+        self,
+        photo: Photo,
+        identity: str,
+        *,
+        rng: np.random.Generator,
+        mask: NDArray[np.bool_] | None = None,
+        windows: NDArray[np.float32] | None = None,
+    ) -> Reading:
+        """Return the reading. Raises Infeasible where no derivation fits the picture."""
+        ...
+
+
 def check_mask(mask: NDArray[np.bool_], shape: tuple[int, ...]) -> None:
     """Raise InvalidInput unless a mask is as large as its picture: (height, width, ...)."""
     if mask.shape != shape[:2]:

@@ -35,8 +35,8 @@ def with_dormers(facade: Facade, bands: Sequence[Band]) -> list[Band]:
     top, foot = min(band.y0 for band in roofs), max(band.y1 for band in roofs)
     if not (ROOF[0] <= foot - top <= ROOF[1] and SKY[0] <= facade.sky <= SKY[1]):
         return list(bands)
-    usual = float(np.median([_relief(facade.plane[band.low : band.high]) for band in rows]))
-    if _relief(facade.plane[top:foot]) < ENOUGH * usual:
+    usual = float(np.median([_relief(facade.shown[band.low : band.high]) for band in rows]))
+    if _relief(facade.shown[top:foot]) < ENOUGH * usual:
         return list(bands)
     margin = int(MARGIN * (foot - top))
     roof = replace(roofs[0], y0=top, y1=foot, low=top + margin, high=foot - margin)

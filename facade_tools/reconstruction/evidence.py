@@ -21,6 +21,7 @@ Plane = NDArray[np.float32]  # (height, width)
 SOFT = 8.0  # CIELAB units at which a difference from the wall counts half
 EDGE = 3.0  # CIELAB units a pixel at which a vertical edge counts half
 EDGES = 1.2  # weight of vertical edges beside colour
+BELIEF = 1.0  # weight of what another method believes of windows beside both
 SPREAD = 2.5  # pixels over which an edge speaks for its surroundings
 REACH = 0.07  # standard deviation of the local mean that is taken off, shares of the height
 ROUNDS = 30
@@ -52,9 +53,21 @@ def window_evidence(picture: Picture, hidden: NDArray[np.bool_] | None = None) -
     known = seen.astype(np.float32)
     near = cv2.GaussianBlur(edges / (edges + EDGE) * known, (0, 0), SPREAD)
     raw = (away / (away + SOFT) + EDGES * near) * known
-    reach = REACH * len(picture)
+    return Evidence(_less_mean(raw, known), known)
+
+
+def with_belief(evidence: Evidence, windows: Plane) -> Plane:
+    """Return the plane of evidence, another method's belief in windows (0..1, any size) added."""
+    known = evidence.seen
+    told = cv2.resize(windows, known.shape[::-1], interpolation=cv2.INTER_AREA) * known
+    return (evidence.plane + BELIEF * _less_mean(told, known)).astype(np.float32)
+
+
+def _less_mean(raw: Plane, known: Plane) -> Plane:
+    """Return a plane less the mean along its rows around a pixel; 0 where nothing is known."""
+    reach = REACH * len(raw)
     mean = _along_rows(raw, reach) / np.maximum(_along_rows(known, reach), 0.05)
-    return Evidence(((raw - mean) * known).astype(np.float32), known)
+    return ((raw - mean) * known).astype(np.float32)
 
 
 def _row_medians(lab: NDArray[np.float32], seen: NDArray[np.bool_]) -> NDArray[np.float32]:

@@ -5,7 +5,7 @@ Nothing is learned: rows and columns of windows are what repeats, and what diffe
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import cv2
@@ -16,11 +16,11 @@ from ..artifacts.grammar import Node
 from ..artifacts.parse import LABELS, Floor, ImageInfo, Parse, Region
 from ..errors import Infeasible
 from ..grammar.derivation import leaves, painted
-from ..grammar.reading import Method, Reading, ReadOptions, label_index, shrunk_mask
+from ..grammar.reading import Reading, ReadOptions, SecondMethod, label_index, shrunk_mask
 from ..imaging.image_io import Photo, fitted
 from . import storeys as floors_module
 from .dormers import with_dormers
-from .evidence import Evidence, agreement, profiles, window_evidence
+from .evidence import agreement, profiles, window_evidence, with_belief
 from .lines import differences, segments
 from .periods import storey_period
 from .potentials import CELL
@@ -43,7 +43,7 @@ class Scale:
     storey: float | None = None
 
 
-def mrf_method(options: ReadOptions) -> Method:
+def mrf_method(options: ReadOptions) -> SecondMethod:
     """Return the unsupervised method of KSTTP09."""
     return partial(read_facade, Scale(options.height, options.storey_height))
 
@@ -55,14 +55,16 @@ def read_facade(
     *,
     rng: np.random.Generator,
     mask: NDArray[np.bool_] | None = None,
+    windows: NDArray[np.float32] | None = None,
 ) -> Reading:
     """Return the parse of a rectified photograph.
 
     Exact inference draws nothing from `rng`. `mask` is true where something hides the facade.
+    windows: another method's belief in windows, 0..1, of any size: evidence beside the picture's.
     Raises Infeasible where the picture is too small for a floor of windows.
     """
     del rng
-    facade = in_cells(photo, scale, mask)
+    facade = in_cells(photo, scale, mask, windows)
     bands, energy = storeys(facade)
     bands = with_dormers(facade, with_shop(facade.plane, bands))
     chain = stripes(facade)
@@ -90,9 +92,15 @@ def read_facade(
     return Reading(parse, painted(tree, shape, label_index()), _raw(facade, shape))
 
 
-def in_cells(photo: Photo, scale: Scale, mask: NDArray[np.bool_] | None = None) -> Facade:
+def in_cells(
+    photo: Photo,
+    scale: Scale,
+    mask: NDArray[np.bool_] | None = None,
+    windows: NDArray[np.float32] | None = None,
+) -> Facade:
     """Return a picture in cells of 10 cm. Without a scale a storey is taken to be 3 m high.
 
+    windows: what another method believes. The skyline and the scale are of the picture alone.
     Raises Infeasible where it has too few pixels or cells for a floor and a window.
     """
     working = fitted(photo.pixels, ROWS, PIXELS)
@@ -109,7 +117,10 @@ def in_cells(photo: Photo, scale: Scale, mask: NDArray[np.bool_] | None = None) 
     colour = differences(found, reach, sky)
     storey = storey_period(rows[sky:], evidence.plane[sky:])
     cell = _cell(scale, storey, height - sky)
-    return _facade(working, evidence, colour, sky, cell, storey)
+    facade = _facade(working, evidence.plane, colour, sky, cell, storey)
+    if windows is None:
+        return facade
+    return replace(facade, plane=_shrunk(with_belief(evidence, windows), facade.shown.shape))
 
 
 def _cell(scale: Scale, storey: float, height: int) -> float:
@@ -121,7 +132,7 @@ def _cell(scale: Scale, storey: float, height: int) -> float:
 
 def _facade(
     working: NDArray[np.uint8],
-    evidence: Evidence,
+    shown: NDArray[np.float32],
     colour: NDArray[np.float64],
     sky: int,
     cell: float,
@@ -132,9 +143,15 @@ def _facade(
     n, m = round(height / cell), round(width / cell)
     floors_module.refuse_small((n, m))
     picture = cv2.resize(working, (m, n), interpolation=cv2.INTER_AREA).astype(np.float64) / 255
-    plane = cv2.resize(evidence.plane, (m, n), interpolation=cv2.INTER_AREA).astype(np.float32)
+    plane = _shrunk(shown, (n, m))
     lines = np.interp(np.arange(n + 1) * height / n, np.arange(height + 1), colour)
-    return Facade(picture, plane, lines, round(sky * n / height), round(storey * n / height))
+    rows = round(sky * n / height), round(storey * n / height)
+    return Facade(picture, plane, plane, lines, *rows)
+
+
+def _shrunk(plane: NDArray[np.float32], cells: tuple[int, ...]) -> NDArray[np.float32]:
+    """Return a plane's means over cells (rows, columns)."""
+    return cv2.resize(plane, cells[::-1], interpolation=cv2.INTER_AREA).astype(np.float32)
 
 
 @dataclass(frozen=True, slots=True)

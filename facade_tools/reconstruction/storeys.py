@@ -77,12 +77,14 @@ def skyline(differences: Floats, rows: Floats) -> int:
 class Facade:
     """A picture in cells: colours 0..1 (n, m, 3), evidence (n, m), and what was found of it.
 
-    differences: of colour across the rows (n+1,). sky: rows of sky. storey: rows after which
-    windows repeat.
+    shown: the evidence of the picture alone, by which roofs are read; `plane` may hold what
+    another method believes too. differences: of colour across the rows (n+1,). sky: rows of sky.
+    storey: rows after which windows repeat.
     """
 
     picture: Floats
     plane: NDArray[np.float32]
+    shown: NDArray[np.float32]
     differences: Floats
     sky: int
     storey: int
@@ -99,9 +101,8 @@ class Rows:
     evidence: Floats
 
 
-def row_profiles(facade: Facade) -> Rows:
-    """Return the profiles of rows. Roofs need not agree with the columns below them."""
-    body = facade.plane[facade.sky :]
+def row_profiles(body: NDArray[np.float32]) -> Rows:
+    """Return the profiles of rows of evidence. Roofs need not agree with the columns below."""
     columns = agreement(body, profiles(body)[1], 4.0)
     columns = np.maximum(columns / (np.percentile(columns, 90) + 1e-9), -0.3)
     any_ = strength(body, 4.0)
@@ -121,7 +122,7 @@ def storeys(facade: Facade) -> tuple[list[Band], float]:
     floor ends: the roof above it costs what its colour and its row of windows say. Raises
     Infeasible where the facade is lower than a ground floor.
     """
-    rows = row_profiles(facade)
+    rows = row_profiles(facade.plane[facade.sky :])
     up = facade.picture[facade.sky :][::-1]
     evidence = np.ascontiguousarray(rows.evidence[::-1])
     n = len(up)
@@ -138,7 +139,11 @@ def storeys(facade: Facade) -> tuple[list[Band], float]:
     problem = ChainProblem(sums, unary, np.zeros((n + 1, 1)), WEIGHTS, ends, grounded=True)
     chain = solve(problem)
     edges = _edges(chain, roofs)
-    return _bands(edges, evidence, rows.columns[::-1], len(facade.plane)), chain.energy
+    bands = _bands(edges, rows, len(facade.plane))
+    if facade.shown is not facade.plane:
+        alone = _bands(edges, row_profiles(facade.shown[facade.sky :]), len(facade.plane))
+        bands = [a if a.kind == "roof" else b for a, b in zip(alone, bands, strict=True)]
+    return bands, chain.energy
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,10 +188,9 @@ def _edges(chain: Chain, roofs: _Roofs) -> list[tuple[str, int, int]]:
     return out + [("roof", low, high) for low, high in pairwise(cuts) if high > low]
 
 
-def _bands(
-    edges: list[tuple[str, int, int]], evidence: Floats, columns: Floats, height: int
-) -> list[Band]:
+def _bands(edges: list[tuple[str, int, int]], profiles_: Rows, height: int) -> list[Band]:
     """Return floors and roof from the ground, in rows from the top."""
+    columns, evidence = profiles_.columns[::-1], profiles_.evidence[::-1]
     out = []
     for kind, start, stop in edges:
         low, high = best_band(np.ascontiguousarray(evidence[start:stop]))

@@ -18,7 +18,14 @@ from ..grammar.library import DEFAULT
 from ..grammar.library import load as load_grammar
 from ..grammar.plan import Plan
 from ..grammar.plan import plan as make_plan
-from ..grammar.reading import Method, Reading, ReadOptions, label_index, shrunk_mask
+from ..grammar.reading import (
+    Method,
+    Reading,
+    ReadOptions,
+    SecondMethod,
+    label_index,
+    shrunk_mask,
+)
 from ..imaging.features_context import Probabilities
 from ..imaging.image_io import Photo
 from . import dp, walk
@@ -28,7 +35,8 @@ from .classifier import load as load_classifier
 from .deriving import Frame, floors_of, regions_of, with_confidence
 from .energy import check_labels, field_of
 from .finishing import finished
-from .second_opinion import exposed, moved
+from .railings import WINDOW
+from .second_opinion import doubt, exposed, moved
 
 PLAIN = "plain"  # the shipped grammar of the fewest labels
 PROBE = 32  # pixels a side
@@ -39,14 +47,15 @@ IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 class Reader:
     """Everything that reading a picture needs, the same for all pictures.
 
-    second: another method whose windows count as far as the classifier doubts.
+    second: another method, which is told the belief in windows; its own count as far as the
+    classifier doubts.
     """
 
     classifier: Classifier
     plan: Plan
     solver: str = "dp"
     name: str = "default"
-    second: Method | None = None
+    second: SecondMethod | None = None
 
 
 Solver = Callable[..., dp.Solution]  # of a field and a plan, with rng
@@ -57,7 +66,7 @@ SOLVERS: Mapping[str, Solver] = {
 }
 
 
-def forest_method(options: ReadOptions, second: Method | None = None) -> Method:
+def forest_method(options: ReadOptions, second: SecondMethod | None = None) -> Method:
     """Return the method of TSKP10: a classifier believes, a grammar explains.
 
     second: another method, whose windows count as far as the classifier doubts.
@@ -115,11 +124,14 @@ def read_facade(
     belief = reader.classifier.probabilities(working)
     shape = photo.pixels.shape[:2]
     raw = raw_labels(belief, reader.classifier.classes, shape)
-    other = _second_reading(reader.second, photo, identity, rng, mask)
-    if other is not None:
-        belief = moved(belief, reader.classifier.classes, other.labels)
+    other = None
     if reader.second is not None:
+        weight = doubt(belief)
         belief = exposed(belief, reader.classifier.classes, working)
+        second = partial(reader.second, windows=_windows(belief, reader.classifier.classes))
+        other = _second_reading(second, photo, identity, rng, mask)
+        if other is not None:
+            belief = moved(belief, reader.classifier.classes, other.labels, weight)
     hidden = _hidden(mask, working.shape[:2], shape)
     belief = np.where(hidden, np.float32(1), belief)
     field = field_of(belief, reader.classifier.classes, reader.plan)
@@ -153,16 +165,19 @@ def read_facade(
     return Reading(parse, painted(tree, shape, label_index()), raw)
 
 
+def _windows(belief: Probabilities, classes: tuple[str, ...]) -> NDArray[np.float32] | None:
+    """Return the belief in windows, None where the classifier knows none."""
+    return belief[classes.index(WINDOW)] if WINDOW in classes else None
+
+
 def _second_reading(
-    second: Method | None,
+    second: Method,
     photo: Photo,
     identity: str,
     rng: np.random.Generator,
     mask: NDArray[np.bool_] | None,
 ) -> Reading | None:
-    """Return what another method reads: nothing where there is none, or no solution of its own."""
-    if second is None:
-        return None
+    """Return what another method reads, None where it has no solution of its own."""
     try:
         return second(photo, identity, rng=rng, mask=mask)
     except Infeasible:

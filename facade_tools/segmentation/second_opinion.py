@@ -2,7 +2,8 @@
 
 A classifier that meets pictures unlike those it has seen doubts, and is wrong where it does not;
 what repeats in rows and columns is seen without any training, and so is what shows no building:
-the rim of a rectified photograph, and a sky that is burnt out.
+the rim of a rectified photograph, and a sky that is burnt out. The other reading is told the
+beliefs first, so that it finds the grid of what both see.
 """
 
 from __future__ import annotations
@@ -15,12 +16,16 @@ from ..artifacts.parse import LABELS
 from ..imaging.features_context import Probabilities
 from ..imaging.image_io import Picture
 from ..imaging.rims import burnt_sky, rim
+from .railings import WINDOW
 
-WEIGHT = 1.5  # of the second reading at most: log odds of a window, and of a wall
+# What the second reading moves at most, in nats of log belief: where it has a window, windows gain
+# and walls lose; elsewhere windows lose and walls gain. (What windows gain, what they lose, walls.)
+FIRM, MILD = (2.5, 5.0, 1.0), (1.5, 1.5, 1.5)
 SKY = 5.0  # log odds that a burnt out sky gains
 ELEMENT = 0.05  # odds of an element that nobody sees, beside wall, roof or sky
 BLANK = ("wall", "roof", "sky")
-SURE, LOST = 0.3, 0.5  # mean entropies in nats: below, it counts nothing; above, all of its weight
+SURE, LOST = 0.38, 0.48  # mean entropies in nats: below, it counts nothing; above, fully
+ALIKE = 0.3  # correlation of both readings' windows: with less, the grid may be missed: mild
 
 
 def exposed(belief: Probabilities, classes: tuple[str, ...], picture: Picture) -> Probabilities:
@@ -42,27 +47,38 @@ def exposed(belief: Probabilities, classes: tuple[str, ...], picture: Picture) -
 
 
 def moved(
-    belief: Probabilities, classes: tuple[str, ...], labels: NDArray[np.uint8]
+    belief: Probabilities, classes: tuple[str, ...], labels: NDArray[np.uint8], weight: float
 ) -> Probabilities:
     """Return beliefs (classes, height, width) that sum to 1, seen together with other labels.
 
     labels: another reading's label map, of any size. Where it has a window, windows gain and walls
-    lose; elsewhere the other way round. Other classes only follow the sum.
+    lose; elsewhere the other way round. Other classes only follow the sum. weight: 0 to 1. A
+    reading whose windows are elsewhere than those believed in moves them less.
     """
-    weight = WEIGHT * _doubt(belief)
-    windows = (labels == LABELS.index("window")).astype(np.float32)
+    windows = (labels == LABELS.index(WINDOW)).astype(np.float32)
     size = (belief.shape[2], belief.shape[1])
-    share = cv2.resize(windows, size, interpolation=cv2.INTER_AREA)
-    factor = np.exp(np.float32(weight) * (2 * share - 1))
+    share = cv2.resize(windows, size, interpolation=cv2.INTER_AREA).astype(np.float32)
+    alike = WINDOW in classes and _correlation(belief[classes.index(WINDOW)], share) >= ALIKE
+    gain, loss, walls = FIRM if alike else MILD
+    gains = {WINDOW: (gain + loss) * share - loss, "wall": walls * (1 - 2 * share)}
     out = belief.copy()
-    for name, by in (("window", factor), ("wall", 1 / factor)):
+    for name, more in gains.items():
         if name in classes:
-            out[classes.index(name)] *= by
+            out[classes.index(name)] *= np.exp(np.float32(weight) * more)
     out /= out.sum(axis=0)
     return out
 
 
-def _doubt(belief: Probabilities) -> float:
-    """Return 0 to 1: how far the mean over pixels of −Σ p ln p is from sure to lost."""
+def doubt(belief: Probabilities) -> float:
+    """Return the weight of a second reading, 0 to 1: how much the classifier doubts.
+
+    The mean over pixels of −Σ p ln p stands between sure and lost.
+    """
     entropy = float(-(belief * np.log(np.maximum(belief, 1e-6))).sum(axis=0).mean())
     return min(max((entropy - SURE) / (LOST - SURE), 0.0), 1.0)
+
+
+def _correlation(one: NDArray[np.float32], two: NDArray[np.float32]) -> float:
+    """Return the correlation of two planes, 0 where one of them is flat."""
+    a, b = one - one.mean(), two - two.mean()
+    return float((a * b).sum() / (np.sqrt(float((a**2).sum()) * float((b**2).sum())) + 1e-9))

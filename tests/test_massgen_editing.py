@@ -14,7 +14,7 @@ from facade_tools.exteriors.attributes import attribute_vector, building_attribu
 from facade_tools.exteriors.mass_editing import contradicted, loosened, suggestion
 from facade_tools.exteriors.mass_energy import GROUPS
 from facade_tools.exteriors.mass_hints import observed_zones, search_target
-from facade_tools.exteriors.mass_porches import hidden, settled_porches
+from facade_tools.exteriors.mass_porches import clear_porches, hidden, outside_porches
 from facade_tools.exteriors.massgen import generate_mass
 from facade_tools.geometry.blocked import porch_strips
 from facade_tools.geometry.checks import element_rectangles, overlaps
@@ -147,14 +147,33 @@ def _overlap(a, b):
 def test_hidden_porch_goes_before_the_wall_and_a_visible_one_stays():
     inside = Box("porch", "porch", 5.0, 1.0, 3.0, 2.0, 2.5)
     assert hidden(inside, [MAIN])
-    (_, moved) = settled_porches((MAIN, inside), None)
+    (_, moved) = outside_porches((MAIN, inside), None)
     assert (moved.x, moved.y) == (5.0, -1.0)
     behind = replace(inside, y=6.9)
-    assert settled_porches((MAIN, behind), None)[1].y == MAIN.depth + 1.0
+    assert outside_porches((MAIN, behind), None)[1].y == MAIN.depth + 1.0
     half = replace(inside, y=0.0)
-    assert settled_porches((MAIN, half), None) == (MAIN, half)
+    assert outside_porches((MAIN, half), None) == (MAIN, half)
     seen = Building("seen", (MAIN, inside), partial=True)
-    assert settled_porches(seen.boxes, seen) == seen.boxes
+    assert outside_porches(seen.boxes, seen) == seen.boxes
+
+
+@pytest.mark.parametrize(("depth", "width"), [(6.4, 2.0), (4.0, 1.2), (6.4, 1.2)])
+def test_a_porch_in_a_notch_of_the_plan_gets_a_plan_with_a_notch(depth, width):
+    """Plans without one are as good until their porch is put before the wall."""
+    flat = Roof("flat")
+    house = Building(
+        "notch",
+        (
+            Box("wing", "general", 2.6, 2.4, 8.2 - width, 6.4, 3.3, flat),
+            Box("street", "general", 0, -3, 14, 4.4, 3.3, flat),
+            Box("porch", "porch", 7 - width / 2, 2.4, width, depth, 2.7, flat),
+            Box("garage", "garage", -12, -4.5, 10, 6, 3.1, flat),
+        ),
+    )
+    for seed in range(3):
+        wanted = replace(building_attributes(house), id=f"notch-{seed}")
+        (mass,) = generate_mass(wanted, rng=np.random.default_rng(seed))
+        assert mass.energy.mass < 1e-3
 
 
 @pytest.mark.parametrize("width", [2.2, 4.0, 6.0])
@@ -162,7 +181,7 @@ def test_posts_and_roof_of_a_new_porch_leave_known_elements_free(width):
     wall = Piece("front-1", "main", (0.0, 0.0, 0.0), 10.0, 3.0, (KNOWN_WINDOW, KNOWN_DOOR))
     seen = Building("seen", (MAIN,), {"front": Facade((wall,))}, partial=True)
     porch = Box("porch", "porch", 4.0 + width / 2, -1.0, width, 2.0, 2.6)
-    (_, moved) = settled_porches((MAIN, porch), seen)
+    (_, moved) = clear_porches((MAIN, porch), seen)
     roofed = replace(porch, x=moved.x, width=moved.width, roof=Roof("shed", 14, "y", 0.25))
     whole = replace(seen, boxes=(MAIN, roofed))
     strips = porch_strips(whole, roofed, "front", wall)
@@ -175,7 +194,7 @@ def test_porch_whose_roof_would_cross_a_known_window_is_left_out():
     wall = Piece("front-1", "main", (0.0, 0.0, 0.0), 10.0, 3.0, (tall,))
     seen = Building("seen", (MAIN,), {"front": Facade((wall,))}, partial=True)
     porch = Box("porch", "porch", 5.0, -1.0, 4.0, 2.0, 2.6)
-    assert settled_porches((MAIN, porch), seen) == (MAIN,)
+    assert clear_porches((MAIN, porch), seen) == (MAIN,)
 
 
 def test_suggestion_holds_to_less_where_the_model_knows_no_such_building(monkeypatch):

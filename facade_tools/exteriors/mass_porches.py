@@ -5,7 +5,7 @@ A porch attribute says place and size, not what stands there: the house itself, 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import product
 
@@ -24,24 +24,39 @@ LEAST = 1.2  # width of a narrowed porch (m)
 STEEPEST = Roof("shed", 14.0, "y", 0.25)  # roof of a porch that reaches highest up the wall
 
 
-def settled_porches(boxes: Sequence[Box], keep: Building | None) -> tuple[Box, ...]:
-    """Return the boxes with new porches moved before the house, clear of known elements.
+def outside_porches(boxes: Sequence[Box], keep: Building | None) -> tuple[Box, ...]:
+    """Return the boxes with new porches that are hidden in the house moved before its wall.
 
-    A porch hidden in the house goes before its wall; one whose posts or roof would stand before a
-    known window or door is moved or resized along the wall. Left out where neither helps. Boxes
-    of `keep` stay.
+    Left out where they stay hidden. Boxes of `keep` stay.
     """
+
+    def outside(porch: Box, solid: Sequence[Box]) -> Box | None:
+        return _before(porch, solid) if hidden(porch, solid) else porch
+
+    return _each_new(boxes, keep, outside)
+
+
+def clear_porches(boxes: Sequence[Box], keep: Building | None) -> tuple[Box, ...]:
+    """Return the boxes with new porches clear of known elements.
+
+    One whose posts or roof would stand before a known window or door is moved or resized along the
+    wall, or left out. Boxes of `keep` stay.
+    """
+    return _each_new(boxes, keep, lambda porch, solid: _clear(porch, solid, keep))
+
+
+def _each_new(
+    boxes: Sequence[Box],
+    keep: Building | None,
+    settled: Callable[[Box, Sequence[Box]], Box | None],
+) -> tuple[Box, ...]:
+    """Return the boxes with every new porch as `settled` (of it and the house) makes it."""
     known = {box.id for box in keep.boxes} if keep else set()
-    found: list[Box] = []
     solid = [box for box in boxes if box.kind != "porch"]
-    for box in boxes:
-        if box.kind != "porch" or box.id in known:
-            found.append(box)
-            continue
-        outside = box if not hidden(box, solid) else _before(box, solid)
-        clear = None if outside is None else _clear(outside, solid, keep)
-        found += [] if clear is None else [clear]
-    return tuple(found)
+    found = [
+        settled(box, solid) if box.kind == "porch" and box.id not in known else box for box in boxes
+    ]
+    return tuple(box for box in found if box is not None)
 
 
 def hidden(porch: Box, solid: Sequence[Box]) -> bool:

@@ -19,7 +19,7 @@ from .mass_energy import Target, layout_of, mass_energy, relative_residuals
 from .mass_hints import search_target
 from .mass_layout import EMPTY, GARAGE, GENERAL, Layout, move_to_origin
 from .mass_polish import round_layout
-from .mass_porches import settled_porches
+from .mass_porches import clear_porches, outside_porches
 from .mass_roofs import (
     chimney_of,
     draw_roof_plan,
@@ -105,9 +105,12 @@ def find_masses(
         if not known:
             move_to_origin(layout)
         mass = _rounded(layout, known, target, curve)
+        mass = _changed(mass, outside_porches(mass.boxes, keep), target)
         found.append((rank(mass.energy, pool.taste[k]), mass))
     ranked = [mass for _, mass in sorted(found, key=lambda row: row[0])]
-    chosen = [_with_porches(mass, keep, target) for mass in diverse(ranked, count)]
+    chosen = [
+        _changed(mass, clear_porches(mass.boxes, keep), target) for mass in diverse(ranked, count)
+    ]
     return sorted(chosen, key=lambda mass: mass.energy)
 
 
@@ -129,9 +132,8 @@ def _rounded(
     return min(tries, key=lambda mass: mass.energy)
 
 
-def _with_porches(mass: Mass, keep: Building | None, target: Target) -> Mass:
-    """Return a mass whose new porches can be seen and leave known elements free."""
-    boxes = settled_porches(mass.boxes, keep)
+def _changed(mass: Mass, boxes: tuple[Box, ...], target: Target) -> Mass:
+    """Return a mass with other boxes and the energy of these."""
     return mass if boxes == mass.boxes else Mass(boxes, *mass_energy(boxes, target), mass.curve)
 
 

@@ -228,6 +228,23 @@ def test_the_eaves_between_a_tower_and_a_wing_stay():
     assert min(float(part[0][:, 1].min()) for part in front) == pytest.approx(-0.35)
 
 
+def test_roofs_that_share_an_area_and_a_line_are_cut():
+    """A garage before two wings in one plane: what lies under its roof is an area and a line."""
+    boxes = (
+        Box("main", "general", 8.15, 2.5095, 16.3, 5.019, 6.0, Roof("gable", 40.0, "x", 0.3)),
+        Box("wing", "general", 8.15, 7.7095, 16.3, 5.381, 2.5, Roof("gable", 40.0, "x", 0.3)),
+        Box("garage", "garage", 2.394, 3.727, 4.788, 6.4, 2.5, Roof("gable", 40.0, "y", 0.3)),
+    )
+    scene = building_scene(Building("h", boxes))
+    above = 0.0
+    for mesh in scene.meshes:
+        if mesh.name.startswith("roof") and mesh.material == "roof":
+            a, b, c = (mesh.vertices[mesh.faces[:, k], :2] for k in range(3))
+            (x, y), (u, v) = (b - a).T, (c - a).T
+            above += float(np.maximum(x * v - y * u, 0.0).sum()) / 2
+    assert above >= 16.3 * 10.4 - 1e-6  # the plan
+
+
 def points_in(shape, rng):
     if shape.area < 1e-2:
         return []

@@ -72,7 +72,9 @@ def _meet(
     for lower, higher, area, k in ((a, b, under, i), (b, a, over, j)):
         if area.is_empty:
             continue
+        # On a grid GEOS refuses areas with the points and lines where two only touch.
         inside = area if crossing else shapely.intersection(area, higher.face, grid_size=SNAP)
+        inside = areas(inside)
         lost = areas(shapely.difference(inside, lower.face, grid_size=SNAP))
         if lost.area > LEAST:
             cuts[k].append(lost)

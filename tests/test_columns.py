@@ -10,12 +10,12 @@ import pytest
 from facade_tools.artifacts.stylesheet import StyleFloor
 from facade_tools.formats.mesh_reader import read_textured
 from facade_tools.formats.textured import GREY, Paint, TexturedMesh
-from facade_tools.stylization.bays import relief_bays
 from facade_tools.stylization.capture import capture_style
 from facade_tools.stylization.columns import aligned_rules, common_rule
-from facade_tools.stylization.groups import group_rule
+from facade_tools.stylization.groups import splitting_rule
 from facade_tools.stylization.outline import WallFace
 from facade_tools.stylization.projection import face_pictures
+from facade_tools.stylization.relief import relief_bays
 from facade_tools.stylization.rhythm import regular_labels
 from facade_tools.stylization.splitting import SplitRule
 from facade_tools.stylization.synthesis import resized_rule
@@ -70,7 +70,7 @@ def test_a_face_without_any_wall_has_no_windows():
     picture = np.full((40, 60, 3), 200, dtype=np.uint8)
     picture[:, ::6] = 30
     picture[10:30] = 255 - picture[10:30]
-    rule = group_rule([picture], 1.0, 0)
+    rule = splitting_rule([picture], 1.0, 0)
     assert rule.insertable == () or sum(rule.scalable) > 0
 
 

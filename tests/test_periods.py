@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from facade_tools.imaging.image_io import Picture
-from facade_tools.stylization.groups import group_rule
+from facade_tools.stylization.groups import splitting_rule
 from facade_tools.stylization.splitting import SplitRule
 from facade_tools.stylization.synthesis import synthesised
 
@@ -91,7 +91,7 @@ AWKWARD = {
 def test_resized_facades_keep_the_distance_of_windows(name, factor):
     middles, width = AWKWARD[name]
     drawn = facade(middles, width)
-    rule = group_rule([drawn], width, 0)
+    rule = splitting_rule([drawn], width, 0)
     assert len(rule.insertable) == len(middles)
     source, target = (width, 8.0), (factor * width, 8.0)
     wide = synthesised(drawn, (rule, WALL), source, target, DENSITY)

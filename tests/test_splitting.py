@@ -9,18 +9,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from facade_tools.stylization.labels import (
+    insertable_labels,
+    merged,
+    rule_of,
+    two_means,
+    variance_signal,
+)
 from facade_tools.stylization.splitting import (
     MARGINS,
     SplitRule,
-    insertable_labels,
-    merged,
     packed,
     repeat,
-    rule_of,
     split,
     split_rule,
-    two_means,
-    variance_signal,
 )
 from facade_tools.stylization.synthesis import at_scale, filled, positions
 

@@ -18,7 +18,7 @@ from facade_tools.stylization.atlas import painted, planned
 from facade_tools.stylization.bases import building_blocks
 from facade_tools.stylization.capture import capture_style
 from facade_tools.stylization.framing import standard_view
-from facade_tools.stylization.groups import group_rule
+from facade_tools.stylization.groups import splitting_rule
 from facade_tools.stylization.model import CaptureOptions
 from facade_tools.stylization.outline import wall_faces
 from facade_tools.stylization.projection import texel_density
@@ -360,7 +360,7 @@ def bands(*colours_and_metres, density=20):
 def test_a_pale_upper_pane_belongs_to_its_window():
     """Dark panes alone are insertable in one pass; a cut between the panes would show."""
     storey = [(215, 0.7), (185, 1.0), (30, 1.0), (215, 0.3)]
-    rule = group_rule([bands(*storey * 4)], 12.0, 1)
+    rule = splitting_rule([bands(*storey * 4)], 12.0, 1)
     assert rule.insertable == pytest.approx([2.0] * 4, abs=0.2)
 
 
@@ -369,7 +369,7 @@ def test_pale_windows_beside_a_dark_bay_are_found():
     storey[20:40, 190:210] = 20
     for left in (*range(20, 180, 40), *range(230, 390, 40)):
         storey[20:40, left : left + 20] = 170
-    rule = group_rule([storey], 20.0, 0)
+    rule = splitting_rule([storey], 20.0, 0)
     assert len(rule.insertable) == 9
 
 

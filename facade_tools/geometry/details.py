@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import zlib
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from ..artifacts.building import SIDES, Building, Colors, Element, Piece, Side
+from ..artifacts.building import Building, Colors, Element, Piece, Side
 from ..artifacts.footprint import Footprint
 from .detail_boxes import Box6, LocalFrame, meshes_of, side_frame
 from .detail_cladding import cladding, corner_boards, wall_pattern
@@ -18,9 +17,10 @@ from .detail_roofs import roof_slabs
 from .detail_volumes import bay_window, chimney, porch
 from .detail_windows import CASING, window_parts
 from .mesh import Material, Mesh, Scene
+from .pieces import named_elements, named_pieces
 from .solids import Solid, building_solid, footprint_solid, triangulated
 
-PALETTE = (
+SCHEMES = (  # of what has no colours of its own
     Colors("#d9d3c3", "#f4f2ec", "#54575c", "#7a2e2a"),
     Colors("#9fb0b5", "#f5f5f2", "#4a4744", "#2e4057"),
     Colors("#c9b79c", "#fbf8f0", "#6b4a3a", "#36523f"),
@@ -47,10 +47,8 @@ def building_scene(building: Building) -> Scene:
         *corner_boards(solid, pattern),
         *_roofs(building, solid),
     ]
-    for side in SIDES:
-        if side in building.facades:
-            for index, piece in enumerate(building.facades[side].pieces, 1):
-                meshes += _piece(f"{side}/piece-{index}", side, piece)
+    for name, side, piece in named_pieces(building):
+        meshes += _piece(name, side, piece)
     meshes += _attached(building)
     return Scene(building.id, tuple(meshes), materials(colors, pattern))
 
@@ -98,7 +96,7 @@ def footprint_scene(footprint: Footprint) -> Scene:
 
 def _own_colors(identity: str) -> Colors:
     """Return colours for what knows none: its name picks them, so that streets are mixed."""
-    return PALETTE[zlib.crc32(identity.encode()) % len(PALETTE)]
+    return SCHEMES[zlib.crc32(identity.encode()) % len(SCHEMES)]
 
 
 def mass_mesh(solid: Solid) -> Mesh:
@@ -135,10 +133,8 @@ def _mixed(first: str, second: str) -> str:
 
 def _piece(name: str, side: Side, piece: Piece) -> Iterator[Mesh]:
     frame = side_frame(side, piece.origin)
-    count: Counter[str] = Counter()
-    for element in piece.elements:
-        count[element.kind] += 1
-        yield from element_meshes(f"{name}/{element.kind}-{count[element.kind]}", element, frame)
+    for part, element in named_elements(name, piece):
+        yield from element_meshes(part, element, frame)
     yield from _plinth(f"{name}/plinth", piece, frame)
 
 

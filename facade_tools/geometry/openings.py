@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -12,9 +11,10 @@ from shapely import Polygon, box
 from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
-from ..artifacts.building import SIDES, Building
+from ..artifacts.building import Building
 from .arrays import Floats, Points3
 from .detail_boxes import LocalFrame, side_frame
+from .pieces import named_elements, named_pieces
 from .solids import Face, Label, Solid
 from .triangulate import newell_normal
 
@@ -44,17 +44,11 @@ class Opening:
 def openings_of(building: Building) -> list[Opening]:
     """Return all elements of a building's facades as openings, named like the scene's parts."""
     out = []
-    for side in SIDES:
-        if side not in building.facades:
-            continue
-        for index, piece in enumerate(building.facades[side].pieces, 1):
-            count: Counter[str] = Counter()
-            frame = side_frame(side, piece.origin)
-            for e in piece.elements:
-                count[e.kind] += 1
-                name = f"{side}/piece-{index}/{e.kind}-{count[e.kind]}"
-                rectangle = (e.u, e.v, e.u + e.width, e.v + e.height)
-                out.append(Opening(name, e.kind, e.style, frame, rectangle))
+    for start, side, piece in named_pieces(building):
+        frame = side_frame(side, piece.origin)
+        for name, e in named_elements(start, piece):
+            rectangle = (e.u, e.v, e.u + e.width, e.v + e.height)
+            out.append(Opening(name, e.kind, e.style, frame, rectangle))
     return out
 
 

@@ -7,13 +7,14 @@ its eaves. Heights and plan positions are compared after rounding to 1e-6 m.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
-from ..artifacts.building import SIDES, Box, Building, Piece, Side
+from ..artifacts.building import SIDES, Box, Building, Element, Piece, Side
 from .arrays import Floats, Integers
 from .boxes import box_rectangles, edge_positions, rounded
 from .floors import mass_boxes, storeys
@@ -126,3 +127,19 @@ def _owner(run: list[_Strip]) -> int:
         lengths[strip.owner] = lengths.get(strip.owner, 0.0) + strip.stop - strip.start
     longest = max(lengths.values())
     return min(owner for owner, length in lengths.items() if length >= longest - 1e-9)
+
+
+# --- names ----------------------------------------------------------------------------------------
+def named_pieces(building: Building) -> Iterator[tuple[str, Side, Piece]]:
+    """Yield the pieces that a building lists, with the names of their parts' common beginning."""
+    for side in (side for side in SIDES if side in building.facades):
+        for index, piece in enumerate(building.facades[side].pieces, 1):
+            yield f"{side}/piece-{index}", side, piece
+
+
+def named_elements(name: str, piece: Piece) -> Iterator[tuple[str, Element]]:
+    """Yield the elements of a piece of that name with their own names, counted by kind."""
+    count: Counter[str] = Counter()
+    for element in piece.elements:
+        count[element.kind] += 1
+        yield f"{name}/{element.kind}-{count[element.kind]}", element

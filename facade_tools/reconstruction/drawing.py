@@ -15,7 +15,7 @@ from ..geometry.arrays import Floats, Points2, Points3
 from ..geometry.detail_boxes import Box6, LocalFrame, meshes_of
 from ..geometry.detail_doors import door_leaf
 from ..geometry.detail_windows import glazing
-from ..geometry.details import PALETTE, mass_mesh, materials
+from ..geometry.details import SCHEMES, mass_mesh, materials
 from ..geometry.mesh import Material, Mesh, Scene
 from ..geometry.openings import Opening, pierced
 from ..geometry.patterns import pattern_uv
@@ -140,7 +140,7 @@ def _paint(leaf: Leaf, points: Points3, normal: Floats, look: Look) -> Painted:
 def _materials(derived: Derived, look: Look, meshes: Iterable[Mesh]) -> dict[str, Material]:
     """Return the materials that the meshes use."""
     walls: dict[str, float] = defaultdict(float)
-    known = materials(PALETTE[0], "")
+    known = materials(SCHEMES[0], "")
     for leaf in derived.leaves:
         color = color_of(leaf.terminal)
         pattern = "shingle" if leaf.terminal.label == "roof" else ""

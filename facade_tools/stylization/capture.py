@@ -21,7 +21,7 @@ from ..artifacts.stylesheet import (
 from ..formats.textured import TexturedMesh
 from ..imaging.image_io import Picture
 from .framing import WORTH_SAYING
-from .groups import group_rule, horizontal_groups, vertical_groups
+from .groups import horizontal_groups, splitting_rule, vertical_groups
 from .model import CaptureOptions, Model, Part, modelled
 from .outline import WallFace
 from .projection import SIDES, top_picture
@@ -147,7 +147,7 @@ def _rules(
         for number in sorted(set(numbers)):
             members = [i for i, n in enumerate(numbers) if n == number]
             sizes = [faces[i].height if axis else faces[i].width for i in members]
-            rule = group_rule([pictures[i] for i in members], max(sizes), axis, window)
+            rule = splitting_rule([pictures[i] for i in members], max(sizes), axis, window)
             name = f"{direction[0]}{number}"
             groups.append(Group(name, direction, name))  # type: ignore[arg-type]
             rules.append(_rule(name, rule))

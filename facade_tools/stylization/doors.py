@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ..artifacts.building import SIDES, Building, Element, Piece, Side
+from ..artifacts.building import Building, Element, Piece, Side
 from ..geometry.arrays import Floats
 from ..geometry.detail_boxes import Box6, LocalFrame, meshes_of, side_frame
 from ..geometry.detail_windows import CASING
 from ..geometry.details import element_meshes
 from ..geometry.mesh import Mesh
+from ..geometry.pieces import named_elements, named_pieces
 from .placing import LEDGE
-from .projection import SIDES as AXES
+from .projection import SIDES
 from .walling import Cover
 
 GROUND = 1.0  # m above the ground: a door that stands higher belongs to a storey of the style
@@ -26,7 +26,7 @@ def door_covers(building: Building) -> list[Cover]:
     """Return the doors on the ground, with their casings, as covers of a building's walls."""
     covers = []
     for _, side, piece, door in _ground_doors(building):
-        along, direction, depth, _ = AXES[side]
+        along, direction, depth, _ = SIDES[side]
         ends = (door.u - CASING, door.u + door.width + CASING)
         low, high = sorted(piece.origin[along] + direction * u for u in ends)
         bottom = piece.origin[2] + door.v
@@ -59,14 +59,10 @@ def door_meshes(building: Building, walls: Sequence[Mesh]) -> list[Mesh]:
 
 
 def _ground_doors(building: Building) -> Iterator[tuple[str, Side, Piece, Element]]:
-    for side in (side for side in SIDES if side in building.facades):
-        for index, piece in enumerate(building.facades[side].pieces, 1):
-            count: Counter[str] = Counter()
-            for element in piece.elements:
-                count[element.kind] += 1
-                name = f"{side}/piece-{index}/{element.kind}-{count[element.kind]}"
-                if element.kind != "window" and piece.origin[2] + element.v < GROUND:
-                    yield name, side, piece, element
+    for start, side, piece in named_pieces(building):
+        for name, element in named_elements(start, piece):
+            if element.kind != "window" and piece.origin[2] + element.v < GROUND:
+                yield name, side, piece, element
 
 
 def _depths(quads: Floats, frame: LocalFrame, rectangle: Floats) -> tuple[float, float]:

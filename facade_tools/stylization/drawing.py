@@ -17,8 +17,9 @@ from ..geometry.arrays import Floats
 from ..geometry.mesh import Material, Mesh, Scene
 from ..imaging.image_io import Picture
 from .groups import mean_picture
+from .labels import variance_signal
 from .projection import SIDES
-from .splitting import SplitRule, variance_signal
+from .splitting import SplitRule
 from .style import group_rule
 from .synthesis import resized_rule
 

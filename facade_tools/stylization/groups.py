@@ -11,9 +11,10 @@ import numpy as np
 
 from ..geometry.arrays import Booleans, Floats
 from ..imaging.image_io import Picture
+from .labels import insertable_labels, merged, rule_of, variance_signal
 from .outline import WallFace
 from .rhythm import SHORTEST, period, periodic_labels, profile, regular_labels
-from .splitting import SplitRule, insertable_labels, merged, rule_of, variance_signal
+from .splitting import SplitRule
 
 SHAPE_LINK = 0.9  # of eq. 1
 TEXTURE_LINK = 0.5  # of eq. 2
@@ -98,7 +99,7 @@ def _neighbours(faces: Sequence[WallFace]) -> list[tuple[list[int], list[int]]]:
     return pairs
 
 
-def group_rule(
+def splitting_rule(
     pictures: Sequence[Picture], size: float, axis: int, window: float | None = None
 ) -> SplitRule:
     """Return the splitting rule of a group from the mean of its pictures (4.3.4).

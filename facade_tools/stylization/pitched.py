@@ -47,23 +47,20 @@ def crowned(scene: Scene, style: Style, building: Building) -> Scene:
     crown = crown_scene(building, solid if pitched else None)
     meshes, materials = list(crown.meshes), dict(crown.materials)
     walls, *bare = scene.meshes  # the mass comes first
-    meshes += door_meshes(building, [_unframed(mesh, building) for mesh in bare])
+    frame = frame_of(building)
+    home = None if frame is None else np.linalg.inv(np.array(frame)).tolist()
+    meshes += door_meshes(building, [framed(mesh, home) for mesh in bare])
     walls = _under_roof(walls, building, solid) if pitched else _filled(walls)
     scene = replace(scene, meshes=(walls, *bare))
     if pitched:
         picture, size = plain_wall(style)
         meshes.append(_gables(building, solid, size))
         materials["gable"] = Material("gable", "#ffffff", texture=encoded_page(picture))
-    meshes = [framed(mesh, frame_of(building)) for mesh in meshes]
+    meshes = [framed(mesh, frame) for mesh in meshes]
     used = {mesh.material for mesh in meshes}
     kept = {f"own-{name}": replace(materials[name], name=f"own-{name}") for name in sorted(used)}
     own = [replace(m, material=f"own-{m.material}") for m in meshes if len(m.faces)]
     return replace(scene, meshes=(*scene.meshes, *own), materials={**scene.materials, **kept})
-
-
-def _unframed(mesh: Mesh, building: Building) -> Mesh:
-    frame = frame_of(building)
-    return mesh if frame is None else framed(mesh, np.linalg.inv(np.array(frame)).tolist())
 
 
 # --- the closed solid -----------------------------------------------------------------------------

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from ..compiled import compiled
 from ..geometry.arrays import Floats, Integers
 from ..imaging.image_io import Picture
-from .splitting import SplitRule, end_wall, split, variance_signal
+from .labels import variance_signal
+from .splitting import SplitRule, end_wall, split
 
 PLAIN = 0.5  # of a wall beside windows, that a face without windows is made of
 ROWS, LAYERED = 24, 0.05  # a picture's rows, and their least standard deviation in one of layers

@@ -6,7 +6,6 @@ row in which others are alike is not inserted a second time.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -48,34 +47,42 @@ def in_line(rule: SplitRule, rows: Sequence[Picture]) -> SplitRule:
 
 
 def standing_out(rule: SplitRule, row: Picture) -> set[int]:
-    """Return which sections of a row resemble no other: all, or those among others alike."""
-    sections = [section(row, *ends) for ends in borders(rule)]
-    count = len(sections)
-    if count == 1:
-        return {0} if unlike(sections[0], sections[0][:, ::-1]) else set()
-    best, odd = np.full(count, -1.0), np.ones(count, dtype=bool)
-    for i, j in itertools.combinations(range(count), 2):
-        pairs = [(sections[i], sections[j]), (sections[i], sections[j][:, ::-1])]
-        best[[i, j]] = np.maximum(best[[i, j]], max(likeness(*pair) for pair in pairs))
-        odd[[i, j]] &= all(unlike(*pair) for pair in pairs)
-    told = odd.all() or best.max() >= ALIKE
+    """Return which sections of a row resemble no other: all, or those among others alike.
+
+    A section alone is held against its own mirror image, several against each other's as well.
+    """
+    sections = np.stack([section(row, *ends) for ends in borders(rule)])
+    mirrored = sections[:, :, ::-1]
+    others = [mirrored] if len(sections) == 1 else [sections, mirrored]
+    alike = np.max([likeness(sections, other) for other in others], axis=0)
+    apart = np.min([difference(sections, other) for other in others], axis=0)
+    unlike = (alike < UNLIKE) & (apart >= VISIBLE)
+    if len(sections) == 1:
+        return {0} if unlike.all() else set()
+    itself = np.eye(len(sections), dtype=bool)
+    odd = (unlike | itself).all(axis=1)
+    told = odd.all() or alike[~itself].max() >= ALIKE
     return set(np.flatnonzero(odd).tolist()) if told else set()
 
 
-def unlike(a: Floats, b: Floats) -> bool:
-    """Tell whether two sections (SIDE, SIDE, 3) show different things."""
-    return likeness(a, b) < UNLIKE and float(np.abs(a - b).mean()) >= VISIBLE
-
-
-def likeness(a: Floats, b: Floats) -> float:
-    """Return the correlation of two sections' columns, −1 to 1.
+def likeness(a: Floats, b: Floats) -> Floats:
+    """Return the correlation of the columns of sections (m, SIDE, SIDE, 3) and (n, …), (m, n).
 
     Colours are taken against the mean of their row: what runs through a row (the frame of a board,
-    a plinth) would make everything on it alike.
+    a plinth) would make everything on it alike. Plain sections are like all others.
     """
-    a, b = (v - v.mean(axis=1, keepdims=True) for v in (a, b))
-    size = float(np.sqrt((a**2).sum() * (b**2).sum()))
-    return float((a * b).sum()) / size if size > 1e-6 else 1.0
+    a, b = ((v - v.mean(axis=2, keepdims=True)).reshape(len(v), -1) for v in (a, b))
+    size = np.sqrt(np.outer((a**2).sum(axis=1), (b**2).sum(axis=1)))
+    plain = size <= 1e-6
+    return np.where(plain, 1.0, (a @ b.T) / np.where(plain, 1.0, size))
+
+
+def difference(a: Floats, b: Floats) -> Floats:
+    """Return the mean difference of colours of sections (m, SIDE, SIDE, 3) and (n, …), (m, n)."""
+    from scipy.spatial.distance import cdist
+
+    distance = cdist(a.reshape(len(a), -1), b.reshape(len(b), -1), "cityblock")
+    return np.asarray(distance / a[0].size)
 
 
 def borders(rule: SplitRule) -> list[tuple[float, float]]:

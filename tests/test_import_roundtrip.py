@@ -81,6 +81,15 @@ def test_standard_input_and_folders_are_read(facade, tmp_path) -> None:
     assert list(rows(piped.stdout)) == ["h"]
 
 
+def test_a_folder_of_folders_is_an_error_not_nothing(facade, tmp_path) -> None:
+    (tmp_path / "below").mkdir()
+    (tmp_path / "below" / "one").write_text("{}")
+    (tmp_path / "README.md").write_text("# Houses")
+    run = facade("import", tmp_path)
+    assert run.returncode == 3
+    assert f"error: {tmp_path}: holds no file to import".encode() in run.stderr
+
+
 def test_an_id_that_stands_twice_is_refused(facade, tmp_path) -> None:
     document = json.dumps(City().add("h", gable_house(12.0, 8.0, 5.5, 35.0)).document())
     for name in ("one", "two"):

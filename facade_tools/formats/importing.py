@@ -67,7 +67,11 @@ def items(paths: Iterable[str], options: ReadOptions) -> Iterator[Item]:
     What cannot be read becomes an item with its error, and the next file follows.
     """
     for path in paths:
-        for file in _files(path):
+        files = _files(path)
+        if not files:
+            error = InvalidInput("holds no file to import; folders in it are not searched")
+            yield Item(path, Source(_name(path), ""), None, None, error.at(path))
+        for file in files:
             try:
                 with _opened(file) as stream:
                     yield from _records(stream, file, options)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from judges import khronos_issues
 from test_stylization import BOX, style_of, textured_box
 
-from facade_tools.artifacts.building import Box, Building, Chimney, Frame, Roof
+from facade_tools.artifacts.building import Box, Building, Chimney, Colors, Frame, Roof
 from facade_tools.formats import gltf
 from facade_tools.formats.textured import joined
 from facade_tools.geometry.solids import building_solid, triangulated
@@ -140,6 +140,16 @@ def test_a_style_without_relief_is_put_on_as_ever(style):
     for a, b in zip(plain, flush, strict=True):
         assert np.array_equal(a.vertices, b.vertices)
         assert np.array_equal(a.faces, b.faces)
+
+
+def test_roofs_keep_the_buildings_colour_or_take_the_styles(style):
+    red = np.full((9, 9, 3), (200, 30, 10), np.uint8)
+    red[:4] = 255
+    tiled = replace(style, pictures={**style.pictures, style.sheet.roof: red})
+    blue = Colors("#ffffff", "#ffffff", "#102030", "#ffffff")
+    for colors, expected in ((None, "#c81e0a"), (blue, "#102030")):
+        scene = dressed(tiled, house(Roof("hip", 30), colors=colors))
+        assert scene.materials["own-roof"].color == expected
 
 
 def test_porches_and_chimneys_stand_where_the_building_has_them(style):

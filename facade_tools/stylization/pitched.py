@@ -39,13 +39,16 @@ Piece = tuple[Picture, tuple[float, float]]  # and its width and height, m
 def crowned(scene: Scene, style: Style, building: Building) -> Scene:
     """Return a retargeted building under its own roofs, with its doors, porches and chimneys.
 
-    Roofs keep the building's colour; gables take a plain piece of the style's wall, mirrored so
-    that it repeats without seams. A building of flat roofs alone keeps the style's roofs.
+    Roofs keep the building's colour, those of a building without colours take the style's; gables
+    take a plain piece of the style's wall, mirrored so that it repeats without seams. A building of
+    flat roofs alone keeps the style's roofs.
     """
     solid = building_solid(building)
     pitched = any(box.roof is not None and box.roof.style != "flat" for box in building.boxes)
     crown = crown_scene(building, solid if pitched else None)
     meshes, materials = list(crown.meshes), dict(crown.materials)
+    if building.colors is None:
+        materials["roof"] = replace(materials["roof"], color=roof_colour(style))
     walls, *bare = scene.meshes  # the mass comes first
     frame = frame_of(building)
     home = None if frame is None else np.linalg.inv(np.array(frame)).tolist()
@@ -61,6 +64,13 @@ def crowned(scene: Scene, style: Style, building: Building) -> Scene:
     kept = {f"own-{name}": replace(materials[name], name=f"own-{name}") for name in sorted(used)}
     own = [replace(m, material=f"own-{m.material}") for m in meshes if len(m.faces)]
     return replace(scene, meshes=(*scene.meshes, *own), materials={**scene.materials, **kept})
+
+
+def roof_colour(style: Style) -> str:
+    """Return the median colour of a style's view from above, #rrggbb."""
+    pixels = style.pictures[style.sheet.roof].reshape(-1, 3)
+    r, g, b = np.median(pixels, axis=0).astype(int).tolist()
+    return f"#{r:02x}{g:02x}{b:02x}"
 
 
 # --- the closed solid -----------------------------------------------------------------------------

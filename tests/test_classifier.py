@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import io
 import zipfile
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -19,6 +20,7 @@ from facade_tools.segmentation.boosting import dataset as boosting_dataset
 from facade_tools.segmentation.classifier import Classifier, decoded, default, save
 from facade_tools.segmentation.conventions import CONVENTIONS, convention
 from facade_tools.segmentation.evaluation import Tally, boxes_of_labels, groups, matched
+from facade_tools.segmentation.make_default import OPTIONS, make_default
 from facade_tools.segmentation.network_training import NetworkOptions
 from facade_tools.segmentation.painting import render_facade
 from facade_tools.segmentation.patches import ForestOptions, patch_codes, patch_tests
@@ -290,6 +292,20 @@ def test_the_shipped_classifier_reads_rendered_facades():
     belief = classifier.probabilities(classifier.working(pair.picture))
     found = np.array([LABELS.index(name) for name in classifier.classes])[belief.argmax(axis=0)]
     assert (found == pair.labels)[pair.labels > 0].mean() > 0.7
+
+
+def test_the_script_of_the_shipped_classifier_makes_one_that_reads_facades():
+    small = replace(OPTIONS, stages=2, height=160, coarse=96, early=SMALL, boost=SMALL)
+    made = decoded(save(make_default(6, options=small)))
+    assert set(made.classes) == set(default().classes)
+    assert made.network is None
+    pair = rendered(77, 160, 288)
+    belief = made.probabilities(made.working(pair.picture))
+    labels = cv2.resize(pair.labels, belief.shape[:0:-1], interpolation=cv2.INTER_NEAREST)
+    found = np.array([LABELS.index(name) for name in made.classes])[belief.argmax(axis=0)]
+    seen = labels > 0
+    commonest = max((labels[seen] == k).mean() for k in range(1, len(LABELS)))
+    assert (found == labels)[seen].mean() > commonest + 0.1
 
 
 @pytest.mark.parametrize("name", list(CONVENTIONS))

@@ -267,6 +267,22 @@ def test_findings_are_no_single_json_document(facade_here, tmp_path):
     assert b"name a .txt or .jsonl file" in done.stderr
 
 
+def test_what_is_no_artifact_is_told_the_kinds_once(facade_here, tmp_path):
+    (tmp_path / "a.json").write_text('{"schema": "facade-tools/house/1"}')
+    done = facade_here("validate", "a.json", cwd=tmp_path)
+    assert b"expected facade-tools/KIND/1 with KIND one of attributes, blocks," in done.stdout
+    assert len(done.stdout) < 250
+
+
+@pytest.mark.parametrize(
+    ("word", "told"), [("veiw", b"Did you mean 'view'?"), ("xyzzy", b"No such stage 'xyzzy'.")]
+)
+def test_a_mistyped_stage_is_told_the_nearest(facade_here, word, told):
+    done = facade_here(word, "a.json")
+    assert done.returncode == 2
+    assert done.stderr.strip().endswith(told)
+
+
 def test_ids_cannot_leave_the_folder(facade, tmp_path):
     row = json.loads(BUNGALOWS.read_text().splitlines()[0])
     row["id"] = "../../evil"

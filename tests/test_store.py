@@ -186,7 +186,13 @@ def test_standard_input_holds_lines_or_one_document():
             "id: a\nboxes:\n  - id: b\n    kind: general\n    dept: 3",
             r"x\.yaml:3: /boxes/0: 'height'",
         ),
-        ("x.json", "[1]", "is a JSON list"),
+        ("x.json", "[1]", r"is a JSON list; expected .*building/1 \(several: one a line"),
+        (
+            "x.json",
+            f"{json.dumps(HOUSE)}\n{json.dumps(HOUSE)}\n",
+            "a document a line; .* ending .jsonl",
+        ),
+        ("x.json", f"{json.dumps(HOUSE)} {{}}\n", "not valid JSON: Extra data"),
     ],
 )
 def test_errors_name_file_line_and_pointer(tmp_path, name, content, message):

@@ -146,7 +146,9 @@ def artifact_class(kind: str) -> type[Any]:
 
 def kind_of(document: Any, expected: tuple[str, ...]) -> str:
     """Return the artifact kind of `document`; raises InvalidInput unless it is `expected`."""
-    wanted = " or ".join(f"facade-tools/{kind}/1" for kind in expected)
+    wanted = _wanted(expected)
+    if isinstance(document, list):
+        raise InvalidInput(f"is a JSON list; expected {wanted} (several: one a line of a .jsonl)")
     if not isinstance(document, dict):
         found = type(document).__name__
         raise InvalidInput(f"is a JSON {found}; expected an object with schema {wanted}")
@@ -157,6 +159,12 @@ def kind_of(document: Any, expected: tuple[str, ...]) -> str:
         if schema == f"facade-tools/{kind}/1":
             return kind
     raise InvalidInput(f"is {str(schema)[:80]!r}; expected {wanted}", pointer="/schema")
+
+
+def _wanted(expected: tuple[str, ...]) -> str:
+    if len(expected) == len(KINDS):
+        return f"facade-tools/KIND/1 with KIND one of {', '.join(expected)}"
+    return " or ".join(f"facade-tools/{kind}/1" for kind in expected)
 
 
 def decode(document: Any, *expected: str) -> Any:

@@ -43,7 +43,7 @@ class RawItem:
             document = parse_yaml(self.data)
             check_finite(document)
         except InvalidInput as error:
-            raise error.at(self.source, self.line) from None
+            raise self._worded(error).at(self.source, self.line) from None
         if implied and isinstance(document, dict) and "schema" not in document:
             return {"schema": f"facade-tools/{implied}/1", **document}
         return document
@@ -60,6 +60,12 @@ class RawItem:
             return decode(document, *names)
         except InvalidInput as error:
             raise self.located(error) from None
+
+    def _worded(self, error: InvalidInput) -> InvalidInput:
+        """Return the error of a file that cannot be parsed; of JSON Lines, what they are."""
+        if self.line is None and not self.yaml and _is_stream(self.data):
+            return InvalidInput("holds a document a line; expected one, or the ending .jsonl")
+        return error
 
     def located(self, error: InvalidInput) -> InvalidInput:
         """Return an error with its file and line: of hand-written YAML, told by the pointer."""
@@ -215,6 +221,16 @@ def _read_stdin(stream: BinaryIO) -> Iterator[RawItem]:
         yield from _lines(stream, "-", 2)
     else:
         yield _whole(stream, "-", not first.lstrip().startswith((b"{", b"[")), first)
+
+
+def _is_stream(data: bytes) -> bool:
+    """Tell whether text that is not one document is JSON Lines: its first line is one."""
+    first, _, rest = data.lstrip().partition(b"\n")
+    try:
+        parse_json(first)
+    except InvalidInput:
+        return False
+    return bool(rest.strip())
 
 
 def _complete(line: bytes) -> bool:

@@ -1,1 +1,1 @@
-"""Public file formats, one module each, every one a pair of read and write functions."""
+"""Public file formats: a reader each, a writer where we write it, and what they share."""

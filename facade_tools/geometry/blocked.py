@@ -74,7 +74,8 @@ class BuiltRoof:
         heights = np.full(len(points), -np.inf)
         for shape, (a, b, c) in zip(self.shapes, self.planes, strict=True):
             over = shapely.intersects_xy(shape, points[:, 0], points[:, 1])
-            np.maximum(heights, points @ np.array([a, b]) + c, out=heights, where=over)
+            if over.any():
+                np.maximum(heights, points @ np.array([a, b]) + c, out=heights, where=over)
         return heights
 
 
@@ -172,12 +173,11 @@ def _roof_strips(box: Box, wall: Wall, piece: Piece) -> Iterator[tuple[float, ..
     us = np.linspace(0.0, piece.width, 2 * count + 1)
     at = np.array(wall.start) + OUTSIDE * np.array(wall.outwards)
     heights = roof_height(box, at + us[:, None] * np.array(wall.along))
-    for k in range(count):
-        part = heights[2 * k : 2 * k + 3]
-        if not np.isnan(part).all():
-            high, low = float(np.nanmax(part)), min(float(np.nanmin(part)), box.height)
-            if high + OVER > bottom and low - UNDER < top:
-                yield us[2 * k], low - UNDER - bottom, us[2 * k + 2], high + OVER - bottom
+    points = np.stack([heights[:-1:2], heights[1::2], heights[2::2]])  # (3, count)
+    highs = np.fmax.reduce(points) + OVER  # NaN, above nothing, where all three are off the roof
+    lows = np.fmin(np.fmin.reduce(points), box.height) - UNDER
+    for k in np.flatnonzero((highs > bottom) & (lows < top)):
+        yield us[2 * k], lows[k] - bottom, us[2 * k + 2], highs[k] - bottom
 
 
 def _buried_strips(

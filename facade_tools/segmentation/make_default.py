@@ -15,6 +15,7 @@ from .training import Pair, TrainOptions, train
 
 GRAMMARS = ("haussmann", "haussmann-floors", "haussmann-floors", "plain")
 HEIGHTS = (300, 640)  # pixels
+OPTIONS = TrainOptions(pixels=800, augment=0, network=NetworkOptions(steps=0))  # trees alone
 
 
 def rendered_pairs(count: int, seed: int) -> Iterator[Pair]:
@@ -28,9 +29,7 @@ def rendered_pairs(count: int, seed: int) -> Iterator[Pair]:
         yield Pair(f"rendered-{number}", picture, labels)
 
 
-def make_default(count: int = 150, seed: int = 0) -> Classifier:
+def make_default(count: int = 150, seed: int = 0, options: TrainOptions = OPTIONS) -> Classifier:
     """Return the classifier trained on `count` rendered facades."""
-    pairs = list(rendered_pairs(count, seed))
     rng: np.random.Generator = item_generator(seed, "default-classifier")
-    trees_alone = NetworkOptions(steps=0)
-    return train(pairs, TrainOptions(pixels=800, augment=0, network=trees_alone), rng=rng)
+    return train(rendered_pairs(count, seed), options, rng=rng)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 
 import click
@@ -140,7 +140,7 @@ def both_methods(options: ReadOptions) -> Method:
     from facade_tools.reconstruction.mrf import mrf_method
     from facade_tools.segmentation.parsing import forest_method
 
-    return forest_method(options, second=mrf_method(options))
+    return forest_method(options, second=partial(mrf_method, options))
 
 
 @lru_cache(maxsize=1)

@@ -16,7 +16,7 @@ from ..artifacts.grammar import Node
 from ..artifacts.parse import LABELS, Floor, ImageInfo, Parse, Region
 from ..errors import Infeasible
 from ..grammar.derivation import leaves, painted
-from ..grammar.reading import Reading, ReadOptions, SecondMethod, label_index, shrunk_mask
+from ..grammar.reading import Method, Reading, ReadOptions, label_index, shrunk_mask
 from ..imaging.image_io import Photo, fitted
 from . import storeys as floors_module
 from .dormers import with_dormers
@@ -43,9 +43,10 @@ class Scale:
     storey: float | None = None
 
 
-def mrf_method(options: ReadOptions) -> SecondMethod:
-    """Return the unsupervised method of KSTTP09."""
-    return partial(read_facade, Scale(options.height, options.storey_height))
+def mrf_method(options: ReadOptions, windows: NDArray[np.float32] | None = None) -> Method:
+    """Return the unsupervised method of KSTTP09, told what another believes of windows."""
+    scale = Scale(options.height, options.storey_height)
+    return partial(read_facade, scale, windows=windows)
 
 
 def read_facade(

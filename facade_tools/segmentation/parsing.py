@@ -18,14 +18,7 @@ from ..grammar.library import DEFAULT
 from ..grammar.library import load as load_grammar
 from ..grammar.plan import Plan
 from ..grammar.plan import plan as make_plan
-from ..grammar.reading import (
-    Method,
-    Reading,
-    ReadOptions,
-    SecondMethod,
-    label_index,
-    shrunk_mask,
-)
+from ..grammar.reading import Informed, Method, Reading, ReadOptions, label_index, shrunk_mask
 from ..imaging.features_context import Probabilities
 from ..imaging.image_io import Photo
 from . import dp, walk
@@ -55,7 +48,7 @@ class Reader:
     plan: Plan
     solver: str = "dp"
     name: str = "default"
-    second: SecondMethod | None = None
+    second: Informed | None = None
 
 
 Solver = Callable[..., dp.Solution]  # of a field and a plan, with rng
@@ -66,7 +59,7 @@ SOLVERS: Mapping[str, Solver] = {
 }
 
 
-def forest_method(options: ReadOptions, second: SecondMethod | None = None) -> Method:
+def forest_method(options: ReadOptions, second: Informed | None = None) -> Method:
     """Return the method of TSKP10: a classifier believes, a grammar explains.
 
     second: another method, whose windows count as far as the classifier doubts.
@@ -128,7 +121,7 @@ def read_facade(
     if reader.second is not None:
         weight = doubt(belief)
         belief = exposed(belief, reader.classifier.classes, working)
-        second = partial(reader.second, windows=_windows(belief, reader.classifier.classes))
+        second = reader.second(_windows(belief, reader.classifier.classes))
         other = _second_reading(second, photo, identity, rng, mask)
         if other is not None:
             belief = moved(belief, reader.classifier.classes, other.labels, weight)

@@ -142,11 +142,11 @@ def _facade(
     height, width = working.shape[:2]
     cell = max(cell, height / MOST, width / MOST)
     n, m = round(height / cell), round(width / cell)
-    floors_module.refuse_small((n, m))
+    rows = round(sky * n / height), round(storey * n / height)
+    floors_module.refuse_small((n - rows[0], m))
     picture = cv2.resize(working, (m, n), interpolation=cv2.INTER_AREA).astype(np.float64) / 255
     plane = _shrunk(shown, (n, m))
     lines = np.interp(np.arange(n + 1) * height / n, np.arange(height + 1), colour)
-    rows = round(sky * n / height), round(storey * n / height)
     return Facade(picture, plane, plane, lines, *rows)
 
 

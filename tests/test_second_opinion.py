@@ -153,7 +153,10 @@ def test_both_take_metres(facade_here, picture):
     done = facade_here("parse-image", picture, "--height", 18)
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["tags"]["scale"] == "height"
-    assert "tags" not in json.loads(facade_here("parse-image", picture).stdout)
+    tags = json.loads(facade_here("parse-image", picture).stdout)["tags"]
+    assert tags.keys() == {"structure", "agreement"}  # a scale that was guessed is not told
+    assert tags["structure"] > 0.5
+    assert tags["agreement"] > 0.5
     assert facade_here("parse-image", picture, "--method", "forest", "--height", 18).returncode == 2
 
 

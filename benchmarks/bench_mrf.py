@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import resource
 import time
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -38,7 +39,7 @@ WINDOW, WALL = LABELS.index("window"), LABELS.index("wall")
 METHODS = {
     "forest": forest_method,
     "mrf": mrf_method,
-    "both": lambda options: forest_method(options, second=mrf_method(options)),
+    "both": lambda options: forest_method(options, second=partial(mrf_method, options)),
 }
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 
 import click
@@ -26,7 +26,7 @@ from facade_tools.randomness import item_generator
 
 from ._items import each
 from ._options import StreamOptions, refuse_overwriting
-from ._rectifying import check_rectification, rectification_of, tell_angle
+from ._rectifying import check_rectification, check_view, rectification_of
 from ._stream import (
     Faults,
     file_name,
@@ -102,8 +102,7 @@ class Read:
             if self.options.rectify is not None:
                 turned = rectification_of(photo, self.options.rectify)
                 photo, mask = _straight(photo, mask, turned)
-            else:
-                tell_angle(path, photo)
+            structure = check_view(path, photo, straight=turned is not None)
             method = _method(self.options.method, _read_options(self.options))
             reading = method(photo, identity, rng=rng, mask=mask)
         except InvalidInput as error:
@@ -112,12 +111,19 @@ class Read:
             raise type(error)(f"{path}: {error}") from None
         inputs = (Source(photo.name, photo.sha256), *self.sources)
         provenance = Provenance(NAME, self.seed, self.options.recorded, inputs)
-        parse = replace(reading.parse, provenance=provenance)
+        parse = replace(reading.parse, provenance=provenance, tags=self._tags(reading, structure))
         if turned is not None:
             parse = replace(parse, rectification=turned.rows)
         document = encode(parse)
         data = dump_document(document) if self.indented else dump_line(document)
         return Result(identity, data, dict(self._pictures(photo, reading)))
+
+    def _tags(self, reading: Reading, structure: float | None) -> Mapping[str, object]:
+        """Return a parse's tags: what a classifier of one's own reads is as it always was."""
+        tags = reading.parse.tags
+        if self.options.method == "forest" or structure is None:
+            return tags
+        return {**tags, "structure": round(structure, 3)}
 
     def _pictures(self, photo: Photo, reading: Reading) -> Iterator[tuple[str, bytes]]:
         if self.options.labels:
@@ -140,7 +146,7 @@ def both_methods(options: ReadOptions) -> Method:
     from facade_tools.reconstruction.mrf import mrf_method
     from facade_tools.segmentation.parsing import forest_method
 
-    return forest_method(options, second=mrf_method(options))
+    return forest_method(options, second=partial(mrf_method, options))
 
 
 @lru_cache(maxsize=1)

@@ -16,17 +16,20 @@ from facade_tools.errors import InvalidInput
 from facade_tools.imaging.homography import Points
 from facade_tools.imaging.image_io import Photo, encoded, read_photo
 from facade_tools.imaging.rectify import (
+    LEAST_CONFIDENCE,
     Rectification,
-    angle_of_view,
     automatic,
     from_corners,
     from_report,
+    view_of,
 )
 
 from ._options import refuse_overwriting
 from ._stream import to_stdout
 
 LOG = logging.getLogger("facade_tools.rectify")
+
+NO_FACADE = 0.2  # structure of a picture that is not read: skies, noise, plants, animals
 
 
 def run_rectify(image: str, output: str, corners: str, report: str | None) -> None:
@@ -63,11 +66,23 @@ def _tell_guess(image: str, found: Rectification) -> None:
         LOG.warning("%s: its lines do not tell the focal length; width to height is a guess", image)
 
 
-def tell_angle(image: str, photo: Photo) -> None:
-    """Warn where a photograph that is taken to be straight looks otherwise."""
-    angle = angle_of_view(photo.pixels)
-    if angle is not None:
-        LOG.warning("%s: looks taken at an angle of %.0f degrees: --rectify auto", image, angle)
+def check_view(image: str, photo: Photo, *, straight: bool) -> float | None:
+    """Return the structure of a photograph that is to be read (None: too small to tell).
+
+    Warns where it shows few lines of a facade, and, unless it was made straight, where it looks
+    taken at an angle. Raises InvalidInput where it shows no facade at all.
+    """
+    view = view_of(photo.pixels)
+    if view.structure is not None and view.structure < NO_FACADE:
+        told = f"shows too few lines in two directions (structure {view.structure:.2f})"
+        raise InvalidInput(f"{told}; expected a facade ({NO_FACADE:g} or more)")
+    if view.structure is not None and view.structure < LEAST_CONFIDENCE:
+        LOG.warning("%s: hardly looks like a facade (structure %.2f)", image, view.structure)
+    if view.angle is not None and not straight:
+        LOG.warning(
+            "%s: looks taken at an angle of %.0f degrees: --rectify auto", image, view.angle
+        )
+    return view.structure
 
 
 def _found(photo: Photo, corners: Points | None) -> Rectification:

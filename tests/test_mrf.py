@@ -165,6 +165,14 @@ def test_a_narrow_picture_is_too_small_where_it_is_read():
         read(np.zeros((6000, 60, 3), np.uint8), Scale(height=20.0))
 
 
+def test_a_strip_whose_facade_is_lower_than_a_floor_is_too_small():
+    """Cells are as wide as 1,500 of them fill a picture: a long street has few rows of them."""
+    street = np.tile(drawn(2, 3), (1, 60, 1))
+    assert street.shape[1] > 40 * street.shape[0]
+    with pytest.raises(Infeasible, match="too small to hold a floor of windows"):
+        read(street)
+
+
 def test_profiles_are_those_of_a_product():
     down, across = np.zeros(40), np.zeros(50)
     down[5:15] = down[25:35] = 1.0

@@ -13,7 +13,7 @@ from facade_tools.errors import InvalidInput
 from facade_tools.grammar.library import builtin
 from facade_tools.imaging.homography import applied, fitted_homography, warped
 from facade_tools.imaging.image_io import decoded
-from facade_tools.imaging.rectify import angle_of_view, automatic, from_corners, from_report
+from facade_tools.imaging.rectify import automatic, from_corners, from_report, view_of
 from facade_tools.segmentation.painting import render_facade
 
 PHOTOS = Path(__file__).parent.parent / "sample_data" / "photos"
@@ -169,22 +169,63 @@ def test_the_command(facade, front, tmp_path):
 @pytest.mark.parametrize("turn", [(0, 0.27, 0), (0, -0.45, 0), (0.3, 0, 0), (0.17, 0.26, 0)])
 def test_photographs_taken_at_an_angle_are_told(front, turn):
     _, homography = photographed(turn)
-    angle = angle_of_view(warped(front, homography, (640, 700)))
+    angle = view_of(warped(front, homography, (640, 700))).angle
     assert angle == pytest.approx(np.degrees(np.linalg.norm(turn)), abs=6)
 
 
 @pytest.mark.parametrize("turn", [(0, 0, 0), (0, 0.05, 0), (0, 0, 0.05)])
 def test_photographs_taken_from_the_front_are_not(front, turn):
-    assert angle_of_view(front) is None
+    assert view_of(front).angle is None
     _, homography = photographed(turn)
-    assert angle_of_view(warped(front, homography, (640, 700))) is None
+    assert view_of(warped(front, homography, (640, 700))).angle is None
 
 
 @pytest.mark.parametrize("shape", [(4, 4, 3), (200, 300, 3)])
 def test_a_picture_without_lines_looks_straight(shape):
-    assert angle_of_view(np.full(shape, 90, np.uint8)) is None
+    assert view_of(np.full(shape, 90, np.uint8)).angle is None
     noise = np.random.default_rng(1).integers(0, 255, shape, np.uint8)
-    assert angle_of_view(noise) is None
+    assert view_of(noise).angle is None
+
+
+def test_the_structure_of_facades_and_of_what_is_none(front):
+    """Facades have lines in two directions, whatever their light; noise and clouds have not."""
+    noise = np.random.default_rng(1).integers(0, 256, (300, 260, 3)).astype(np.uint8)
+    clouds = cv2.GaussianBlur(noise.astype(np.float32), (0, 0), 6.0)
+    clouds = np.clip((clouds - clouds.mean()) * 12 + 128, 0, 255).astype(np.uint8)
+    told = view_of(front).structure
+    assert told > 0.6
+    assert view_of((front * 0.15).astype(np.uint8)).structure == pytest.approx(told, abs=0.1)
+    for picture in (noise, clouds, np.full_like(noise, 140), np.zeros_like(noise)):
+        assert view_of(picture).structure < 0.2
+    assert view_of(front[:150, :150]).structure is None
+    assert view_of(np.tile(front[:200], (1, 30, 1))).structure is None  # 1,000 pixels of 101 rows
+
+
+def test_parse_image_refuses_what_is_no_facade_and_says_how_much_one_looks_like_one(
+    facade, front, tmp_path
+):
+    """The last picture shows a facade behind wires in all directions."""
+    rng = np.random.default_rng(0)
+    wires = front.copy()
+    for _ in range(60):
+        ends = rng.integers(0, (WIDTH, HEIGHT), (2, 2))
+        cv2.line(wires, *map(tuple, ends.tolist()), tuple(rng.integers(0, 255, 3).tolist()), 2)
+    for name, picture in (("a", np.full((300, 260, 3), 90, np.uint8)), ("b", front), ("c", wires)):
+        cv2.imwrite(str(tmp_path / f"{name}.png"), picture[:, :, ::-1])
+    out = tmp_path / "out.jsonl"
+    done = facade("parse-image", tmp_path, "--method", "mrf", "-o", out, "--on-error", "skip")
+    assert done.returncode == 3
+    lines = done.stderr.decode().splitlines()
+    assert any(
+        "a.png: shows too few lines in two directions (structure 0.00); expected a facade" in line
+        for line in lines
+    )
+    assert [line for line in lines if "hardly looks like a facade" in line and "c.png" in line]
+    parses = [json.loads(line) for line in out.read_text().splitlines()]
+    assert [parse["id"] for parse in parses] == ["b", "c"]
+    structures = [parse["tags"]["structure"] for parse in parses]
+    assert structures[0] > 0.6
+    assert 0.2 <= structures[1] < 0.35
 
 
 def test_parse_image_says_what_was_taken_at_an_angle(facade, tmp_path):

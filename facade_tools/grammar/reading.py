@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -52,20 +53,8 @@ class Method(Protocol):
         ...
 
 
-class SecondMethod(Protocol):
-    """A method that can be told what another one believes: `windows`, 0..1, of any size."""
-
-    def __call__(
-        self,
-        photo: Photo,
-        identity: str,
-        *,
-        rng: np.random.Generator,
-        mask: NDArray[np.bool_] | None = None,
-        windows: NDArray[np.float32] | None = None,
-    ) -> Reading:
-        """Return the reading. Raises Infeasible where no derivation fits the picture."""
-        ...
+# A method that can be told what another one believes of windows, 0..1, of any size, None: nothing
+Informed = Callable[[NDArray[np.float32] | None], Method]
 
 
 def check_mask(mask: NDArray[np.bool_], shape: tuple[int, ...]) -> None:

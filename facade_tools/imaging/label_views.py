@@ -26,7 +26,7 @@ def overlay(picture: Picture, parse: Parse, strength: float = 0.45) -> Picture:
         part = out[region.y0 : region.y1, region.x0 : region.x1]
         color = np.array(COLORS.get(region.label, (255, 0, 255)), np.float32)
         part[:] = ((1 - strength) * part + strength * color).astype(np.uint8)
-    thickness = max(1, round(max(out.shape) / 800))
+    thickness = max(1, round(min(out.shape[:2]) / 500))
     for region in parse.regions:
         if region.label in ("window", "balcony", "door", "chimney"):
             low, high = (region.x0, region.y0), (region.x1 - 1, region.y1 - 1)

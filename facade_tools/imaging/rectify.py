@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from ..errors import InvalidInput
 from .homography import Homography, Points, applied, fitted_homography, warped
-from .image_io import MAX_PIXELS, MAX_SIDE, Picture
-from .rectify_lines import segments_of, straight_share, vanishing_points
+from .image_io import MAX_PIXELS, MAX_SIDE, Picture, fitted
+from .rectify_lines import WORKING, segments_of, straight_share, vanishing_points
 
 Vector = NDArray[np.float64]  # (3,) homogeneous
 
@@ -31,6 +31,8 @@ LEAST_LEAN = np.radians(5.0)  # from where proportions hang on the focal length
 LEAST_TELLING = np.radians(2.0)  # out of the picture's plane: both directions, to tell that length
 MOST_GROWTH = 3.0  # of a side
 LEAST_SIDE = 16  # pixels
+JUDGED = 200  # pixels of the shorter side at working size, from where few lines tell something
+BRIGHT = 200  # of 255: darker pictures are lightened before lines are looked for in them
 LARGEST_ENTRY = 1e12  # of a homography: products of three stay far from overflow
 
 
@@ -111,19 +113,45 @@ def automatic(picture: Picture) -> Rectification:
     return replace(_framed(picture.shape, metric, confidence), guessed=guessed)
 
 
-def angle_of_view(picture: Picture) -> float | None:
-    """Return the angle (degrees) between a facade's normal and the view, None if it looks straight.
+@dataclass(frozen=True, slots=True)
+class View:
+    """What the lines of a picture tell of the facade in it.
 
-    It looks straight where its lines tell less than LEAST_ANGLE, tell it unsurely, or are about as
-    parallel as they meet. A focal length that they do not tell is taken to be a usual one.
+    structure: share of line length that agrees with two directions, 0..1, None where the picture is
+    too small to tell. angle: degrees between the facade's normal and the view, None if it looks
+    straight: where its lines tell less than LEAST_ANGLE, tell it unsurely, or are about as parallel
+    as they meet.
     """
-    if min(picture.shape[:2]) < LEAST_SIDE:
-        return None
-    lines = segments_of(picture)
-    across, down, confidence = vanishing_points(lines, picture.shape)
-    if confidence < SURE or straight_share(lines, picture.shape, (across, down)) > PARALLEL:
-        return None
-    height, width = picture.shape[:2]
+
+    structure: float | None
+    angle: float | None
+
+
+def view_of(picture: Picture) -> View:
+    """Return what the lines of a picture tell, with a usual focal length if they tell none."""
+    small = fitted(picture, WORKING, WORKING * WORKING)
+    if min(small.shape[:2]) < LEAST_SIDE:
+        return View(None, None)
+    lines = segments_of(_lightened(small))
+    across, down, confidence = vanishing_points(lines, small.shape)
+    structure = confidence if min(small.shape[:2]) >= JUDGED else None
+    if confidence < SURE or straight_share(lines, small.shape, (across, down)) > PARALLEL:
+        return View(structure, None)
+    return View(structure, _angle(small.shape, across, down))
+
+
+def _lightened(picture: Picture) -> Picture:
+    """Return a dark picture as bright as others are: edges are told by differences."""
+    brightest = float(np.percentile(picture.max(axis=2), 99))
+    if not 0 < brightest < BRIGHT:
+        return picture
+    lightened: Picture = np.minimum(picture * (BRIGHT / brightest), 255).astype(np.uint8)
+    return lightened
+
+
+def _angle(shape: tuple[int, ...], across: Vector, down: Vector) -> float | None:
+    """Return the angle (degrees) between the plane's normal and the view, None if it is small."""
+    height, width = shape[:2]
     focal = USUAL_FOCAL * max(height, width)
     camera = np.array([[1, 0, -width / 2], [0, 1, -height / 2], [0, 0, focal]])
     normal = np.cross(_unit(camera @ across), _unit(camera @ down))

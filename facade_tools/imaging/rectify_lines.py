@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .image_io import Picture, fitted
+from .line_segments import Segments, line_segments
 
-Segments = NDArray[np.float64]  # (n, 4) x0, y0, x1, y1 pixels
 Vector = NDArray[np.float64]  # (3,) homogeneous
 
 WORKING = 1000  # pixels of height at which segments are looked for
@@ -26,13 +26,9 @@ def segments_of(picture: Picture) -> Segments:
     """Return the line segments of a picture in its pixels, longest first."""
     small = fitted(picture, WORKING, WORKING * WORKING)
     scale = picture.shape[0] / small.shape[0]
-    grey = cv2.cvtColor(small, cv2.COLOR_RGB2GRAY)
+    grey = cv2.cvtColor(small, cv2.COLOR_RGB2GRAY).astype(np.uint8)
     shortest = max(8.0, SHORTEST * min(small.shape[:2]))
-    detector = cv2.ximgproc.createFastLineDetector(int(shortest), 1.414, 50, 120, 3, False)
-    found = detector.detect(grey)
-    if found is None:
-        return np.empty((0, 4))
-    lines = (found.reshape(-1, 4).astype(np.float64) + 0.5) * scale
+    lines = (line_segments(grey, int(shortest)) + 0.5) * scale
     order = np.argsort(-_lengths(lines), kind="stable")
     longest: Segments = lines[order[:MOST_SEGMENTS]]
     return longest

@@ -16,7 +16,7 @@ from ..artifacts.grammar import Node
 from ..artifacts.parse import LABELS, Floor, ImageInfo, Parse, Region
 from ..errors import Infeasible
 from ..grammar.derivation import leaves, painted
-from ..grammar.reading import Reading, ReadOptions, SecondMethod, label_index, shrunk_mask
+from ..grammar.reading import Method, Reading, ReadOptions, label_index, shrunk_mask
 from ..imaging.image_io import Photo, fitted
 from . import storeys as floors_module
 from .dormers import with_dormers
@@ -43,9 +43,10 @@ class Scale:
     storey: float | None = None
 
 
-def mrf_method(options: ReadOptions) -> SecondMethod:
-    """Return the unsupervised method of KSTTP09."""
-    return partial(read_facade, Scale(options.height, options.storey_height))
+def mrf_method(options: ReadOptions, windows: NDArray[np.float32] | None = None) -> Method:
+    """Return the unsupervised method of KSTTP09, told what another believes of windows."""
+    scale = Scale(options.height, options.storey_height)
+    return partial(read_facade, scale, windows=windows)
 
 
 def read_facade(
@@ -141,11 +142,11 @@ def _facade(
     height, width = working.shape[:2]
     cell = max(cell, height / MOST, width / MOST)
     n, m = round(height / cell), round(width / cell)
-    floors_module.refuse_small((n, m))
+    rows = round(sky * n / height), round(storey * n / height)
+    floors_module.refuse_small((n - rows[0], m))
     picture = cv2.resize(working, (m, n), interpolation=cv2.INTER_AREA).astype(np.float64) / 255
     plane = _shrunk(shown, (n, m))
     lines = np.interp(np.arange(n + 1) * height / n, np.arange(height + 1), colour)
-    rows = round(sky * n / height), round(storey * n / height)
     return Facade(picture, plane, plane, lines, *rows)
 
 

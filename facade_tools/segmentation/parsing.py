@@ -18,14 +18,7 @@ from ..grammar.library import DEFAULT
 from ..grammar.library import load as load_grammar
 from ..grammar.plan import Plan
 from ..grammar.plan import plan as make_plan
-from ..grammar.reading import (
-    Method,
-    Reading,
-    ReadOptions,
-    SecondMethod,
-    label_index,
-    shrunk_mask,
-)
+from ..grammar.reading import Informed, Method, Reading, ReadOptions, label_index, shrunk_mask
 from ..imaging.features_context import Probabilities
 from ..imaging.image_io import Photo
 from . import dp, walk
@@ -36,7 +29,7 @@ from .deriving import Frame, floors_of, regions_of, with_confidence
 from .energy import check_labels, field_of
 from .finishing import finished
 from .railings import WINDOW
-from .second_opinion import doubt, exposed, moved
+from .second_opinion import agreement, doubt, exposed, moved
 
 PLAIN = "plain"  # the shipped grammar of the fewest labels
 PROBE = 32  # pixels a side
@@ -55,7 +48,7 @@ class Reader:
     plan: Plan
     solver: str = "dp"
     name: str = "default"
-    second: SecondMethod | None = None
+    second: Informed | None = None
 
 
 Solver = Callable[..., dp.Solution]  # of a field and a plan, with rng
@@ -66,7 +59,7 @@ SOLVERS: Mapping[str, Solver] = {
 }
 
 
-def forest_method(options: ReadOptions, second: SecondMethod | None = None) -> Method:
+def forest_method(options: ReadOptions, second: Informed | None = None) -> Method:
     """Return the method of TSKP10: a classifier believes, a grammar explains.
 
     second: another method, whose windows count as far as the classifier doubts.
@@ -124,14 +117,19 @@ def read_facade(
     belief = reader.classifier.probabilities(working)
     shape = photo.pixels.shape[:2]
     raw = raw_labels(belief, reader.classifier.classes, shape)
-    other = None
+    tags: Mapping[str, object] = {}
     if reader.second is not None:
         weight = doubt(belief)
         belief = exposed(belief, reader.classifier.classes, working)
-        second = partial(reader.second, windows=_windows(belief, reader.classifier.classes))
+        second = reader.second(_windows(belief, reader.classifier.classes))
         other = _second_reading(second, photo, identity, rng, mask)
         if other is not None:
-            belief = moved(belief, reader.classifier.classes, other.labels, weight)
+            classes = reader.classifier.classes
+            tags = {
+                **_scale(other),
+                "agreement": round(agreement(belief, classes, other.labels), 3),
+            }
+            belief = moved(belief, classes, other.labels, weight)
     hidden = _hidden(mask, working.shape[:2], shape)
     belief = np.where(hidden, np.float32(1), belief)
     field = field_of(belief, reader.classifier.classes, reader.plan)
@@ -160,7 +158,7 @@ def read_facade(
         optimal=solution.optimal,
         trace=solution.trace,
         derivation=tree,
-        tags=_scale(other),
+        tags=tags,
     )
     return Reading(parse, painted(tree, shape, label_index()), raw)
 
@@ -184,11 +182,9 @@ def _second_reading(
         return None
 
 
-def _scale(other: Reading | None) -> Mapping[str, object]:
+def _scale(other: Reading) -> Mapping[str, object]:
     """Return the scale that another reading was told. One that it guessed says less than floors."""
-    if other is None or other.parse.tags.get("scale") == "relative":
-        return {}
-    return other.parse.tags
+    return {} if other.parse.tags.get("scale") == "relative" else other.parse.tags
 
 
 def raw_labels(

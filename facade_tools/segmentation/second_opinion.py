@@ -18,6 +18,8 @@ from ..imaging.image_io import Picture
 from ..imaging.rims import burnt_sky, rim
 from .railings import WINDOW
 
+Plane = NDArray[np.float32]  # (height, width)
+
 # What the second reading moves at most, in nats of log belief: where it has a window, windows gain
 # and walls lose; elsewhere windows lose and walls gain. (What windows gain, what they lose, walls.)
 FIRM, MILD = (2.5, 5.0, 1.0), (1.5, 1.5, 1.5)
@@ -55,11 +57,8 @@ def moved(
     lose; elsewhere the other way round. Other classes only follow the sum. weight: 0 to 1. A
     reading whose windows are elsewhere than those believed in moves them less.
     """
-    windows = (labels == LABELS.index(WINDOW)).astype(np.float32)
-    size = (belief.shape[2], belief.shape[1])
-    share = cv2.resize(windows, size, interpolation=cv2.INTER_AREA).astype(np.float32)
-    alike = WINDOW in classes and _correlation(belief[classes.index(WINDOW)], share) >= ALIKE
-    gain, loss, walls = FIRM if alike else MILD
+    share = _window_share(labels, belief.shape[1:])
+    gain, loss, walls = FIRM if agreement(belief, classes, labels) >= ALIKE else MILD
     gains = {WINDOW: (gain + loss) * share - loss, "wall": walls * (1 - 2 * share)}
     out = belief.copy()
     for name, more in gains.items():
@@ -67,6 +66,23 @@ def moved(
             out[classes.index(name)] *= np.exp(np.float32(weight) * more)
     out /= out.sum(axis=0)
     return out
+
+
+def agreement(belief: Probabilities, classes: tuple[str, ...], labels: NDArray[np.uint8]) -> float:
+    """Return how windows believed in and another reading's correlate, -1..1, 0 without any.
+
+    labels: the other reading's label map, of any size.
+    """
+    if WINDOW not in classes:
+        return 0.0
+    return _correlation(belief[classes.index(WINDOW)], _window_share(labels, belief.shape[1:]))
+
+
+def _window_share(labels: NDArray[np.uint8], shape: tuple[int, ...]) -> Plane:
+    """Return how much of every pixel of (height, width) is window in a label map of any size."""
+    windows = (labels == LABELS.index(WINDOW)).astype(np.float32)
+    share: Plane = cv2.resize(windows, shape[::-1], interpolation=cv2.INTER_AREA).astype(np.float32)
+    return share
 
 
 def doubt(belief: Probabilities) -> float:
@@ -78,7 +94,7 @@ def doubt(belief: Probabilities) -> float:
     return min(max((entropy - SURE) / (LOST - SURE), 0.0), 1.0)
 
 
-def _correlation(one: NDArray[np.float32], two: NDArray[np.float32]) -> float:
+def _correlation(one: Plane, two: Plane) -> float:
     """Return the correlation of two planes, 0 where one of them is flat."""
     a, b = one - one.mean(), two - two.mean()
     return float((a * b).sum() / (np.sqrt(float((a**2).sum()) * float((b**2).sum())) + 1e-9))

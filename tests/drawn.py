@@ -50,6 +50,12 @@ def assert_possible(a: Attributes) -> None:
     for porch, back in zip(m.porch, (False, True), strict=True):
         assert not any(porch) or (porch[1] >= 0.5) == back
         assert not any(porch) or porch[5] >= min(porch[2:4]) / (2 * sum(porch[2:4])) - 1e-9
+        if porch[2]:
+            apart = [
+                abs(porch[i] - 0.5) * size - (porch[2 + i] + size) / 2
+                for i, size in ((0, w), (1, d))
+            ]
+            assert max(apart) <= 1e-6
         if gw and porch[2]:
             gaps = [
                 abs(m.garage[i] - porch[i]) * size - (m.garage[2 + i] + porch[2 + i]) / 2

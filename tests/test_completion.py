@@ -125,6 +125,21 @@ def test_bounds_are_hard(model):
         draw(model, 1, given=Attributes("b", bounds=Bounds((900.0, 9.0, 4.0))))
 
 
+def test_nothing_stands_on_what_is_low(model):
+    """A kept garage carries no upper floor: houses that are all of two floors do not suit it."""
+    upper = Attributes("g", mass=replace(Attributes("x").mass, bbox=(12.0, 10.0, 5.6)))
+    free = draw(model, 200, given=upper)
+    assert np.mean([a.mass.arf[1] == 0.5 for a in free]) > 0.1
+    low = replace(upper, bounds=Bounds((12.0, 10.0, 5.6), (36.0, 60.0)))
+    for a in draw(model, 200, given=low):
+        ground = a.mass.bcr * 120.0
+        assert ground * (1 - a.mass.arf[1] / a.mass.arf[0]) >= 36.0 * 0.999
+        assert ground * (1 - a.mass.arf[2] / a.mass.arf[0]) >= 60.0 * 0.999
+        assert a.bounds == low.bounds
+    with pytest.raises(Infeasible):
+        draw(model, 1, given=replace(upper, bounds=Bounds((12.0, 10.0, 5.6), (130.0, 130.0))))
+
+
 def test_present_with_unknown_measures(model):
     given = Attributes("g", present=Present(garage=True, porch_front=False))
     for sample in draw(model, 20, given=given):

@@ -62,10 +62,18 @@ def possible(a: Attributes) -> bool:
         and gd / d / 2 - 1e-9 <= py <= 1 - gd / d / 2 + 1e-9
         and gh <= h * (1 + 1e-9)
     )
+    attached = all(
+        not porch[2]
+        or max(
+            abs(porch[i] - 0.5) * size - (porch[2 + i] + size) / 2 for i, size in ((0, w), (1, d))
+        )
+        <= 1e-6
+        for porch in m.porch
+    )
     floors = abs(m.far * m.arf[0] - m.bcr) < 1e-9 and m.arf[0] >= m.arf[1] >= m.arf[2]
     edge = m.bdry * np.sqrt(m.bcr * w * d) >= 2 * (w + d) * (1 - 1e-9)
     glass = all(0 <= x < 1 for x in a.facade.wwr)
-    return bool(inside and floors and edge and glass and any(a.element.roof.values()))
+    return bool(inside and attached and floors and edge and glass and any(a.element.roof.values()))
 
 
 def main() -> None:

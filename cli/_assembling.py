@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from itertools import cycle
 from pathlib import Path
 from typing import Any, get_args
 
@@ -23,6 +22,7 @@ from facade_tools.reconstruction.assemble import Assembly, assemble
 from facade_tools.reconstruction.sides import SideView, view_of_labels, view_of_parse
 from facade_tools.segmentation.conventions import Convention, convention
 
+from ._lots import artifacts_of, by_id, ground_of
 from ._options import StreamOptions
 from ._report import collected_log
 from ._stream import ItemResult, open_sink, run_items, side_input
@@ -35,39 +35,44 @@ CLASSES = "ecp"
 PITCH = 35.0  # degrees of a roof whose pitch nobody says
 
 Item = RawItem | str  # of a stream of artifacts, or the path of a label map
-Task = tuple[Item, Building | None]  # and the mass that stands on its footprint
 
 
 @dataclass(frozen=True)
 class Seen:
-    """A view with the name and digest of what it was read from."""
+    """A view with file, line, name and digest of what it was read from."""
 
     id: str
     view: SideView
     source: Source
+    place: tuple[str, int | None]
 
 
 @dataclass(frozen=True)
 class Assemble:
-    """Makes a building of one view in any process."""
+    """Makes a building of one view in any process. masses: what stands on footprints, by id."""
 
     known: Assembly
+    masses: Mapping[str, Building]
     side: Side
     classes: Convention
     recorded: Mapping[str, Any]
     sources: tuple[Source, ...]
     indented: bool
 
-    def __call__(self, task: Task) -> ItemResult:
+    def __call__(self, item: Item) -> ItemResult:
         """Return the building of one view."""
-        item, mass = task
         with collected_log() as messages:
             seen = _seen(item, self.classes)
-            return ItemResult((self.made({self.side: seen}, mass),), messages)
+            return ItemResult((self.made({self.side: seen}),), messages)
 
-    def made(self, seen: Mapping[Side, Seen], mass: Building | None) -> tuple[str, bytes]:
+    def made(self, seen: Mapping[Side, Seen]) -> tuple[str, bytes]:
         """Return id and bytes of the building that the views show, named after the first."""
-        identity = next(iter(seen.values())).id
+        first = next(iter(seen.values()))
+        identity = first.id
+        try:
+            mass = ground_of(self.masses, identity)
+        except InvalidInput as error:
+            raise error.at(*first.place) from None
         views = {side: one.view for side, one in seen.items()}
         inputs = (*(one.source for one in seen.values()), *self.sources)
         building = assemble(identity, views, replace(self.known, mass=mass))
@@ -84,19 +89,19 @@ def run_assemble(stream: StreamOptions, values: Mapping[str, Any]) -> None:
     footprint = values["footprint"]
     if footprint is not None and values["depth"] is not None:
         raise click.UsageError("a footprint has its depth; expected --footprint or --depth")
-    masses = [None] if footprint is None else _masses(footprint, values["metres"])
+    masses = {} if footprint is None else _masses(footprint, values["metres"])
     measured = footprint if footprint and SIZE.fullmatch(footprint) else None
     recorded = {key: values[key] for key in RECORDED} | _told(values, measured)
     stage = Assemble(
         Assembly(
-            None,
-            values["storey_height"],
-            None if values["roof"] is None else _roof(values["roof"]),
-            values["windows"],
-            not values["no_door"],
-            values["depth"],
-            not values["no_porch"],
+            storey=values["storey_height"],
+            roof=None if values["roof"] is None else _roof(values["roof"]),
+            style=values["windows"],
+            door=not values["no_door"],
+            depth=values["depth"],
+            porch=not values["no_porch"],
         ),
+        masses,
         values["side"],
         convention(values["classes"]),
         recorded,
@@ -104,13 +109,10 @@ def run_assemble(stream: StreamOptions, values: Mapping[str, Any]) -> None:
         stream.output is not None and stream.output.lower().endswith(".json"),
     )
     if not given:
-        run_items(NAME, stage, zip(_items(stream.inputs), cycle(masses), strict=False), stream)
+        run_items(NAME, stage, _items(stream.inputs), stream)
         return
-    if len(masses) > 1:
-        raise InvalidInput(f"holds {len(masses)} footprints; expected one").at(footprint)
     with open_sink(stream.output) as write:
-        views = {side: _only(path, stage.classes) for side, path in given.items()}
-        write(*stage.made(views, masses[0]))
+        write(*stage.made({side: _only(path, stage.classes) for side, path in given.items()}))
 
 
 def _told(values: Mapping[str, Any], measured: str | None) -> dict[str, Any]:
@@ -146,42 +148,34 @@ def _seen(item: Item, classes: Convention) -> Seen:
     if isinstance(item, str):
         source = digest(item)
         try:
-            return Seen(Path(item).stem, view_of_labels(classes.read(item)), source)
+            return Seen(Path(item).stem, view_of_labels(classes.read(item)), source, (item, None))
         except InvalidInput as error:
             raise error.at(item) from None
     parse = item.artifact("parse")
     try:
-        return Seen(parse.id, view_of_parse(parse), item.provenance())
+        place = (item.source, item.line)
+        return Seen(parse.id, view_of_parse(parse), item.provenance(), place)
     except InvalidInput as error:
         raise error.at(item.source, item.line) from None
 
 
-def _masses(text: str, metres: bool) -> list[Building | None]:
-    """Return the masses that footprints give; boxes of unknown height have none."""
+def _masses(text: str, metres: bool) -> dict[str, Building]:
+    """Return the masses that footprints give, by id; boxes of unknown height have none."""
     sizes = SIZE.fullmatch(text)
     if sizes:
         width, depth = float(sizes[1]), float(sizes[2])
         if not all(SIDE_LIMITS[0] <= side <= SIDE_LIMITS[1] for side in (width, depth)):
             raise click.UsageError(f"--footprint {text}: expected 2 to 1000 m a side")
         box = Box("main", "general", width / 2, depth / 2, width, depth)
-        return [Building("footprint", (box,), partial=True)]
-    found: list[Building | None] = [_ground(ground) for ground in _grounds(text, metres)]
-    if not found:
-        raise InvalidInput("holds no footprint; expected at least one").at(text)
-    return found
+        return {"footprint": Building("footprint", (box,), partial=True)}
+    return by_id(map(_mass, artifacts_of(text, metres)), text)
 
 
-def _ground(artifact: Footprint | Building) -> Building:
+def _mass(artifact: Footprint | Building) -> Building:
     if isinstance(artifact, Building):
         return replace(artifact, facades={})
     mass = building_of(artifact)
     return mass if artifact.roof else _without_roofs(mass)
-
-
-def _grounds(path: str, metres: bool) -> Iterator[Footprint | Building]:
-    from ._lots import artifacts_of
-
-    yield from artifacts_of(path, metres)
 
 
 def _without_roofs(mass: Building) -> Building:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
+from typing import TypeVar
 
 from facade_tools.artifacts.building import Building
 from facade_tools.artifacts.footprint import Footprint
@@ -16,6 +18,9 @@ from facade_tools.formats.reading import ReadOptions
 from facade_tools.reconstruction.lots import Plot, plot_of
 
 GEOJSON = (".geojson", ".geojsonl")
+NAMED = 5  # ids of a file that an error lists
+
+G = TypeVar("G", Plot, Building)
 
 
 def plots(path: str, metres: bool = False) -> Iterator[Plot]:
@@ -53,6 +58,36 @@ def grounds(path: str, metres: bool = False) -> Iterator[Ground]:
             yield Ground(error=error.at(path))
     if not found:
         raise InvalidInput("holds no polygon of a building").at(path)
+
+
+def by_id(found: Iterable[G], path: str) -> dict[str, G]:
+    """Return what stands in a file of grounds by its ids.
+
+    Raises InvalidInput where it holds none, and where two have one id.
+    """
+    out: dict[str, G] = {}
+    for ground in found:
+        if ground.id in out:
+            raise InvalidInput(f"two footprints have the id {ground.id!r}; expected one").at(path)
+        out[ground.id] = ground
+    if not out:
+        raise InvalidInput("holds no footprint; expected at least one").at(path)
+    return out
+
+
+def ground_of(grounds: Mapping[str, G], identity: str) -> G | None:
+    """Return what a parse stands on: the only ground, of several the one with the parse's id.
+
+    None where there are no grounds. Raises InvalidInput where none of several has that id.
+    """
+    if len(grounds) < 2:
+        return next(iter(grounds.values()), None)
+    if identity not in grounds:
+        names = ", ".join(map(repr, islice(grounds, NAMED)))
+        more = ", …" if len(grounds) > NAMED else ""
+        message = f"none of {len(grounds)} footprints has the parse's id {identity!r}"
+        raise InvalidInput(f"{message}; expected it among {names}{more}")
+    return grounds[identity]
 
 
 def _plot(artifact: Footprint | Building | RawItem | InvalidInput) -> Plot:

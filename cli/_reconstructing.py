@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from itertools import count
 from pathlib import Path
 from typing import Any
 
 from facade_tools.artifacts.parse import Parse
 from facade_tools.artifacts.provenance import Provenance, Source
-from facade_tools.artifacts.store import RawItem, read_raw
+from facade_tools.artifacts.store import RawItem
 from facade_tools.errors import FacadeError, InvalidInput
 from facade_tools.imaging.image_io import Photo, read_photo
 from facade_tools.randomness import item_generator
@@ -19,7 +18,7 @@ from facade_tools.reconstruction.lots import Plot
 from facade_tools.reconstruction.reconstruct import Ask, reconstruct
 
 from ._items import each
-from ._lots import plots
+from ._lots import by_id, ground_of, plots
 from ._models import Made, Wanted, wanted, write_models
 from ._options import StreamOptions, refuse_overwriting
 from ._stream import Faults, side_input
@@ -30,36 +29,28 @@ log = logging.getLogger("facade_tools.reconstruct")
 
 
 @dataclass(frozen=True)
-class Task:
-    """A parse and the ground that it stands on."""
-
-    item: RawItem
-    plot: Plot | None
-
-
-@dataclass(frozen=True)
 class Maker:
-    """Reconstructs one parse in any process."""
+    """Reconstructs one parse in any process. grounds: what parses stand on, by id."""
 
     ask: Ask
+    grounds: Mapping[str, Plot]
     image: str | None
     seed: int
     recorded: Mapping[str, Any]
     sources: tuple[Source, ...]
     wanted: Wanted
 
-    def __call__(self, task: Task) -> Made:
+    def __call__(self, item: RawItem) -> Made:
         """Return what is wanted of one parse; raises InvalidInput with its place."""
-        item = task.item
         parse = item.artifact(Parse)
         photo = self._photo(item, parse)
-        plot = task.plot
-        lots = () if plot is None else plot.lots
         rng = item_generator(self.seed, NAME, parse.id)
         ask = self.ask
-        if plot is not None and plot.roof is not None:
-            ask = replace(ask, hint=_known(plot.roof.style))
         try:
+            plot = ground_of(self.grounds, parse.id)
+            lots = () if plot is None else plot.lots
+            if plot is not None and plot.roof is not None:
+                ask = replace(ask, hint=_known(plot.roof.style))
             made = reconstruct(parse, photo.pixels, lots, ask, rng=rng)
             inputs = (item.provenance(), Source(photo.name, photo.sha256), *self.sources)
             provenance = Provenance(NAME, self.seed, self.recorded, inputs)
@@ -110,16 +101,11 @@ def run_reconstruct(stream: StreamOptions, values: Mapping[str, Any]) -> None:
     }
     recorded["party"] = sorted(values["party"])
     sources = side_input(footprint)
+    grounds = {} if footprint is None else by_id(plots(footprint, values["metres"]), footprint)
     maker = Maker(
-        ask, values["image"], stream.seed or 0, recorded, sources, wanted(stream.output, tree)
-    )
-    grounds = None if footprint is None else list(plots(footprint, values["metres"]))
-    tasks = _tasks(stream, grounds)
+        ask, grounds, values["image"], stream.seed or 0, recorded, sources,
+        wanted(stream.output, tree),
+    )  # fmt: skip
     faults = Faults(NAME, stream.on_error)
-    write_models(each(maker, stream, faults, tasks), (stream.output, tree), faults)
+    write_models(each(maker, stream, faults), (stream.output, tree), faults)
     faults.complain()
-
-
-def _tasks(stream: StreamOptions, grounds: list[Plot] | None) -> Iterator[Any]:
-    for number, item in zip(count(), read_raw(stream.inputs), strict=False):
-        yield Task(item, None if grounds is None else grounds[number % len(grounds)])

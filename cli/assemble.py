@@ -23,8 +23,8 @@ def _side(name: str) -> Callable[[F], F]:
               show_default=True, help="Which side each PARSE shows.")  # fmt: skip
 @click.option(
     "--footprint", metavar="FILE|WxD",
-    help="GeoJSON, a footprint or a building (of several, each PARSE takes the next); or width"
-         " and depth, metres.  [default: as seen]",
+    help="GeoJSON, a footprint or a building (of several, each PARSE takes the one with its id);"
+         " or width and depth, metres.  [default: as seen]",
 )  # fmt: skip
 @click.option(
     "--depth",

@@ -13,7 +13,8 @@ SIDES = click.Choice(["front", "back", "left", "right"])
 @stream_options("PARSE...")
 @click.option(
     "--footprint", metavar="FILE",
-    help="GeoJSON, a footprint or a building; of several, each parse takes the next.  "
+    help="GeoJSON, a footprint or a building; of several, each parse takes the one with its "
+    "id.  "
     "[default: a rectangle behind the facade]",
 )  # fmt: skip
 @click.option("--metres", is_flag=True, help="The GeoJSON's coordinates are planar metres.")

@@ -234,23 +234,39 @@ def test_the_command_takes_label_maps_and_named_sides(tmp_path, facade_here):
     assert len(document["provenance"]["inputs"]) == 2
 
 
-def test_of_several_footprints_each_picture_takes_the_next(tmp_path, facade_here):
-    for name in "abc":
+def rectangles(path, sizes):
+    """Write GeoJSON of rectangles (planar metres) by the ids of its features."""
+    features = [{"type": "Feature", "properties": {}, "id": name,
+                 "geometry": {"type": "Polygon",
+                              "coordinates": [[[0, 0], [w, 0], [w, d], [0, d], [0, 0]]]}}
+                for name, w, d in sizes]  # fmt: skip
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    return path
+
+
+def test_of_several_footprints_each_picture_takes_its_own(tmp_path, facade_here):
+    """By id, so that a picture left out shifts none of the others, and none is guessed."""
+    for name in "abcd":
         cv2.imwrite(str(tmp_path / f"{name}.png"), label_map(4, 5))
-    rings = [[[0, 0], [w, 0], [w, d], [0, d], [0, 0]] for w, d in ((12, 9), (15, 11))]
-    features = [{"type": "Feature", "properties": {}, "id": f"plot-{k}",
-                 "geometry": {"type": "Polygon", "coordinates": [ring]}}
-                for k, ring in enumerate(rings)]  # fmt: skip
-    plots = tmp_path / "plots.geojson"
-    plots.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
-    options = ("--footprint", plots, "--metres", "--jobs", "2")
-    pictures = [tmp_path / f"{name}.png" for name in "abc"]
-    done = facade_here("assemble", *pictures, *options)
-    boxes = [json.loads(line)["boxes"][0] for line in done.stdout.splitlines()]
-    assert [(box["width"], box["depth"]) for box in boxes] == [(12, 9), (15, 11), (12, 9)]
-    named = facade_here("assemble", "--front", pictures[0], *options[:3])
-    assert named.returncode == 3
-    assert b"holds 2 footprints" in named.stderr
+    plots = rectangles(tmp_path / "plots.geojson", [("c", 12, 9), ("b", 14, 10), ("a", 15, 11)])
+    options = ("--footprint", plots, "--metres")
+    pictures = {name: tmp_path / f"{name}.png" for name in "abcd"}
+    done = facade_here("assemble", pictures["a"], pictures["c"], *options, "--jobs", "2")
+    found = [json.loads(line) for line in done.stdout.splitlines()]
+    sizes = [(row["id"], row["boxes"][0]["width"], row["boxes"][0]["depth"]) for row in found]
+    assert sizes == [("a", 15, 11), ("c", 12, 9)]
+    named = facade_here("assemble", "--front", pictures["b"], "--left", pictures["d"], *options)
+    assert json.loads(named.stdout)["boxes"][0]["width"] == 14
+    missing = facade_here("assemble", *pictures.values(), *options, "--on-error", "skip")
+    assert missing.returncode == 3
+    assert len(missing.stdout.splitlines()) == 3
+    assert b"d.png: none of 3 footprints has the parse's id 'd'; expected it among 'c'" in (
+        missing.stderr
+    )
+    twice = rectangles(tmp_path / "twice.geojson", [("a", 12, 9), ("a", 14, 10)])
+    done = facade_here("assemble", pictures["a"], "--footprint", twice, "--metres")
+    assert done.returncode == 3
+    assert b"two footprints have the id 'a'" in done.stderr
 
 
 @pytest.mark.parametrize(("tags", "eaves", "storey"), [

@@ -264,10 +264,24 @@ def test_incomplete_mass_is_null_with_bounds():
     assert a.mass.bbox == (None,) * 3
     assert (a.mass.bcr, a.mass.bdry, a.mass.far, a.mass.arf) == (None, None, None, (None,) * 3)
     assert a.bounds.bbox_min == (16, 8, 3)
+    assert a.bounds.low_area == (36, 36)
     assert a.mass.garage == pytest.approx((13 / 16, 3 / 8, 6, 6, 3, 18 / 24))
     assert a.mass.porch == ((None,) * 6,) * 2
     assert (a.present.garage, a.present.porch_front) == (True, None)
     assert a.element.roof == dict.fromkeys(("flat", "gable", "hip"))
+
+
+@pytest.mark.parametrize(
+    ("storey", "height", "low"),
+    [(3.0, 3.4, (14, 14)), (3.0, 3.5, (0, 14)), (2.4, 3.6, (14, 14)), (2.4, 3.7, (0, 14))],
+)
+def test_plan_of_boxes_too_low_for_floors(storey, height, low):
+    """Of those that lie under a box of unknown height it is not known; 3 m is not stated."""
+    house, wing = general(0, 0, 10, 8, None, roof=None), general(8, 0, 12, 7, height, "wing")
+    under = general(9, 0, 10, 1, 2, "under")
+    for boxes in ((house, wing), (house, wing, under)):
+        found = building_attributes(partial(*boxes, storey_height=storey)).bounds
+        assert found.low_area == low
 
 
 def test_complete_says_what_is_absent():

@@ -13,6 +13,7 @@ from facade_tools.artifacts.building import Box, Building, Colors, Element, Faca
 from facade_tools.artifacts.documents import encode
 from facade_tools.artifacts.numbers import dump_line
 from facade_tools.artifacts.store import read
+from facade_tools.artifacts.writing import write_artifacts
 from facade_tools.errors import InvalidInput
 from facade_tools.exteriors.attributes import building_attributes
 from facade_tools.exteriors.facade_layout import WIDE_WALL
@@ -21,6 +22,7 @@ from facade_tools.exteriors.library import (
     build_library,
     default_library,
     kmeans,
+    read_library,
 )
 from facade_tools.exteriors.palette import house_colors
 from facade_tools.geometry.checks import building_problems
@@ -146,6 +148,12 @@ def test_similar_building_has_the_same_bits():
     wanted = building_attributes(sample("victorian", 5))
     for entry in shelf.nearest(wanted, 3, np.random.default_rng(0)):
         assert entry.id.startswith("victorian")
+
+
+def test_the_file_of_a_library_without_windows_is_named(tmp_path):
+    write_artifacts(tmp_path / "bare.jsonl", [bare(sample("bungalow"))])
+    with pytest.raises(InvalidInput, match=r"bare\.jsonl: the library's buildings have no window"):
+        read_library(str(tmp_path / "bare.jsonl"))
 
 
 def test_library_of_windowless_buildings_is_refused():

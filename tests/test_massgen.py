@@ -238,6 +238,23 @@ def test_distance_of_masses():
 # --- roofs ----------------------------------------------------------------------------------------
 
 
+def test_a_porch_that_would_stand_apart_is_put_at_the_house():
+    """Nothing connects it to the house where its attributes put it: both porches were lost."""
+    boxes = (
+        box("a", 0, 0, 12, 6, 2.8),
+        box("b", 6, 6, 12, 10, 2.8),
+        box("front", 2, -2.7, 4.4, -1.2, 2.4, "porch"),
+        box("back", 8, 10.8, 10.4, 12.3, 2.4, "porch"),
+    )
+    (building,) = made(building_attributes(Building("l", boxes)))
+    house = box_rectangles([b for b in building.boxes if b.kind != "porch"])
+    porches = box_rectangles([b for b in building.boxes if b.kind == "porch"])
+    assert len(porches) == 2
+    assert porches[:, 3].min() >= house[:, 1].min() - 1e-6
+    assert porches[:, 1].max() <= house[:, 3].max() + 1e-6
+    assert building.energy.mass < 0.05
+
+
 def test_roof_bits_are_realised():
     for bits in ({"gable": 1}, {"gable": 0, "hip": 1}, {"flat": 1, "gable": 0}, {"hip": 1}):
         wanted = targets("ell", roof=bits)

@@ -8,8 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from facade_tools.artifacts.building import Building
 from facade_tools.artifacts.parse import Region
-from facade_tools.artifacts.store import read_one
+from facade_tools.artifacts.store import read, read_one
+from facade_tools.artifacts.writing import write_artifacts
 from facade_tools.errors import InvalidInput
 from facade_tools.formats import gltf
 from facade_tools.geometry.checks import building_problems
@@ -186,3 +188,19 @@ def test_a_parse_on_a_buildings_mass(facade_here, rendered, tmp_path):
     assert [replace(box, roof=None) for box in one.boxes] == [
         replace(box, roof=None) for box in two.boxes
     ]
+
+
+def test_of_several_footprints_each_parse_takes_its_own(facade_here, rendered, tmp_path):
+    first = facade_here("reconstruct", rendered / "parses.jsonl", "-o", tmp_path / "a.jsonl")
+    assert first.returncode == 0, first.stderr
+    houses = list(read(tmp_path / "a.jsonl", Building))
+    mine = [replace(houses[1], boxes=(replace(houses[1].boxes[0], depth=9.0),)),
+            replace(houses[0], id="unseen")]  # fmt: skip
+    write_artifacts(tmp_path / "plots.jsonl", mine)
+    done = facade_here("reconstruct", rendered / "parses.jsonl", "--footprint",
+                       tmp_path / "plots.jsonl", "--on-error", "skip",
+                       "-o", tmp_path / "b.jsonl")  # fmt: skip
+    assert done.returncode == 3
+    assert b"parses.jsonl:1: none of 2 footprints has the parse's id '0-0'" in done.stderr
+    (made,) = read(tmp_path / "b.jsonl", Building)
+    assert (made.id, made.boxes[0].depth) == ("0-1", 9.0)

@@ -69,9 +69,14 @@ class Present:
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """Hard limits known of a partial building; bbox_min: least width, depth, height (m)."""
+    """Hard limits known of a partial building.
+
+    bbox_min: least width, depth, height (m). low_area: plan area (m²) of listed boxes that are too
+    low for floor 1, and for floor 2: nothing is built on them.
+    """
 
     bbox_min: tuple[float, ...]
+    low_area: tuple[float, ...] = (0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -22,8 +22,12 @@ from ..artifacts.attributes import (
 from ..artifacts.building import Box, Building
 from ..errors import InvalidInput
 from ..geometry.arrays import Floats, Integers
+from ..geometry.boxes import box_rectangles, union_area_perimeter
+from ..geometry.floors import TOLERANCE
 from .facade_attributes import facade_vector, pack_facades
 from .mass_attributes import ARF, BBOX, GARAGE_AT, KINDS, PORCH_AT, mass_vector
+from .physical import LEAST_STOREY
+from .relations import states_storeys
 
 _PART = ("x", "y", "w", "d", "h", "exposure")
 _SIDES = ("front", "back", "left", "right")
@@ -142,7 +146,16 @@ def _bounds(building: Building) -> Bounds | None:
         return None
     width = max(b.x + b.width / 2 for b in mass) - min(b.x - b.width / 2 for b in mass)
     depth = max(b.y + b.depth / 2 for b in mass) - min(b.y - b.depth / 2 for b in mass)
-    return Bounds((width, depth, max(b.height or 0.0 for b in mass)))
+    least = (width, depth, max(b.height or 0.0 for b in mass))
+    storey = building.storey_height if states_storeys(building) else LEAST_STOREY
+    return Bounds(least, (_low_area(mass, 1.5 * storey), _low_area(mass, 2.5 * storey)))
+
+
+def _low_area(mass: Sequence[Box], reach: float) -> float:
+    """Return the plan area (m²) of boxes that do not reach above `reach`; unknown heights may."""
+    high = [box for box in mass if not box.height or box.height > reach + TOLERANCE]
+    whole, left = (union_area_perimeter(box_rectangles(boxes))[0] for boxes in (mass, high))
+    return max(round(whole - left, 6), 0.0)
 
 
 # --- element bits ---------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..artifacts.attributes import Attributes, MassAttributes
+from ..artifacts.attributes import Attributes, Bounds, MassAttributes
 from ..errors import Infeasible
 from .conditioning import draw_given, resampled
 from .coordinates import Bits, Floats, Readings, read_attributes
@@ -82,14 +82,27 @@ def accept(rows: Readings, network: Network, given: Attributes, held: tuple[Bits
     good = np.ones(len(rows), dtype=np.bool_) & _solve_floors(columns, given.mass)
     settle(rows.values, layout, _with_solved(held, layout, given.mass))
     good &= _solve_boundary(columns, given.mass)
-    sizes = columns.get("width", "depth", "height")
-    if given.bounds is not None and sizes:
-        for column, least in zip(sizes, given.bounds.bbox_min, strict=True):
-            good &= column >= least * (1 - 1e-12)
+    if given.bounds is not None:
+        good &= _in_bounds(columns, given.bounds)
     if states_storeys(given) and not _heights_known(given.mass):
         usual = storey_heights(rows.values, layout, given.storey_height)
         good &= np.abs(usual / given.storey_height - 1) <= NEAR
     return good & _garage_fits(columns)
+
+
+def _in_bounds(columns: Columns, bounds: Bounds) -> Masks:
+    """Tell where the house holds the listed boxes and nothing stands on the low ones."""
+    good = np.asarray(True)
+    sizes = columns.get("width", "depth", "height")
+    for column, least in zip(sizes or (), bounds.bbox_min, strict=sizes is not None):
+        good = good & (column >= least * (1 - 1e-12))
+    plan = columns.get("width", "depth", "bcr", "r1", "r2")
+    if plan:
+        width, depth, bcr, r1, r2 = plan
+        second = r1 * np.where(np.isfinite(r2), r2, 0.0)
+        for share, low in zip((r1, second), bounds.low_area, strict=True):
+            good = good & ((1 - share) * bcr * width * depth >= low * (1 - ROUNDED))
+    return good
 
 
 def _heights_known(mass: MassAttributes) -> bool:

@@ -51,13 +51,13 @@ def snapped_garage(house: tuple[Floats, Floats], part: Part) -> tuple[Floats, Fl
 def touching(house: tuple[Floats, Floats], part: Part, sign: int) -> Floats:
     """Return py of porches at the wall; sign: −1 front, 1 back.
 
-    Moved there are those that stand free, and those that reach into the house from its front or
-    back: a plan that is full has no recess for them. One that stands beside the house stays.
+    Moved there are those that reach into the house from its front or back, or do not reach it: a
+    plan that is full has no recess for them. One that stands beside the house stays.
     """
     w, d = house
     limit = np.where(sign < 0, 0.0, 1.0) + sign * part.depth / d / 2
     before = np.abs(part.px - 0.5) < 0.5 + (part.width / 2 - FLUSH) / w
-    return np.where((part.py - limit) * sign > 0, limit, np.where(before, limit, part.py))
+    return np.where(before, limit, part.py)
 
 
 def rectangle_exposure(house: tuple[Floats, Floats], part: Part) -> Floats:

@@ -112,7 +112,10 @@ def read_library(path: str) -> ElementLibrary:
     prepared = [item for item in items if isinstance(item, Library)]
     if prepared and len(items) > 1:
         raise InvalidInput("holds a library and more; expected one library, or buildings").at(path)
-    return ElementLibrary(prepared[0] if prepared else build_library(items))
+    try:
+        return ElementLibrary(prepared[0] if prepared else build_library(items))
+    except InvalidInput as error:
+        raise error.at(path) from None
 
 
 def build_library(buildings: Iterable[Building], identity: str = "library") -> Library:

@@ -51,11 +51,10 @@ def loosened(attributes: Attributes, keep: Building, groups: tuple[str, ...]) ->
         if not np.isnan(seen[at]):
             vector[at] = seen[at]
     free = attributes_of_vector(attributes.id, vector, attributes.storey_height)
-    least: tuple[float, ...] = known.bounds.bbox_min if known.bounds else (0.0, 0.0, 0.0)
     present = known.present or Present()
     return replace(
         free,
-        bounds=Bounds(least),
+        bounds=known.bounds or Bounds((0.0, 0.0, 0.0)),
         present=Present(
             garage=_present(free.mass.garage, present.garage),
             porch_front=_present(free.mass.porch[0], present.porch_front),

@@ -15,6 +15,7 @@ import numpy as np
 from ..artifacts.attributes import ROOF_BITS, ElementAttributes
 from ..artifacts.building import Axis, Box, Chimney, Roof, RoofStyle
 from ..geometry.floors import FLOORS
+from .attributes import ROOF_OF_STYLE
 from .mass_taste import TOWER_RATIO, TOWER_WIDTH
 
 CHIMNEY = 0.7  # width of a chimney (m)
@@ -102,8 +103,7 @@ def _under_higher(box: Box, roof: Roof, higher: Iterable[Box]) -> Roof:
 
 
 def _style(box: Box) -> str:
-    style = box.roof.style if box.roof else ""
-    return {"shed": "gable", "mansard": "hip"}.get(style, style)
+    return ROOF_OF_STYLE.get(box.roof.style, "") if box.roof else ""
 
 
 def _volume(box: Box) -> float:

@@ -80,14 +80,17 @@ def _snapped(value: float, low: float, high: float) -> float:
 
 @compiled
 def part_row(values: Floats, frame: Floats) -> Floats:
-    """Return the row of a garage or porch with attributes `values` (6,) in `frame` (4,)."""
+    """Return the row of a garage or porch with attributes `values` (6,) in `frame` (4,).
+
+    One that would stand apart from the frame is put at it: nothing could connect it to the house.
+    """
     row = np.empty(5)
     for axis in range(2):
-        size = frame[2 + axis] - frame[axis]
-        centre = frame[axis] + values[axis] * size
-        low, high = centre - values[2 + axis] / 2, centre + values[2 + axis] / 2
-        row[axis] = _snapped(low, frame[axis], frame[2 + axis])
-        row[2 + axis] = _snapped(high, frame[axis], frame[2 + axis])
+        start, end = frame[axis], frame[2 + axis]
+        half = values[2 + axis] / 2
+        centre = min(max(start + values[axis] * (end - start), start - half), end + half)
+        row[axis] = _snapped(centre - half, start, end)
+        row[2 + axis] = _snapped(centre + half, start, end)
     row[4] = values[4]
     return row
 

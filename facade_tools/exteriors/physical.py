@@ -107,9 +107,9 @@ def settle(
     """Move complete rows, in place, to what is possible.
 
     Ranges; r2 only above an r1; the garage inside the bounding box and not higher; porches on
-    their side of the middle, outside the garage, no wider than the house and open to one side; at
-    a full rectangle, exposures as places fix them (`full_plans`). fixed (n, d) a group: 1 where a
-    value is given and must stay.
+    their side of the middle, at the bounding box or in it, outside the garage, no wider than the
+    house and open to one side; at a full rectangle, exposures as places fix them (`full_plans`).
+    fixed (n, d) a group: 1 where a value is given and must stay.
     """
     _ranges(values, layout, fixed)
     no_second_floor(values, layout)
@@ -124,6 +124,7 @@ def settle(
             moved = np.minimum(place[0], limit) if sign < 0 else np.maximum(place[0], limit)
             _put(place[0], moved, held, f"{name}.py")
             _along_house(columns, held, name, sign)
+            _at_house(columns, held, name)
             _out_of_garage(columns, held, name, sign)
             _open_side(columns, held, name)
             _settle_porch(columns, held, name, sign)
@@ -145,6 +146,16 @@ def _along_house(columns: Columns, held: Columns | None, name: str, sign: int) -
         _put(size, np.where(before, np.minimum(size, width), size), held, f"{name}.width")
         half = np.minimum(size / width / 2, MIDDLE)
         _put(px, np.where(before, np.clip(px, half, 1 - half), px), held, f"{name}.px")
+
+
+def _at_house(columns: Columns, held: Columns | None, name: str) -> None:
+    """Push a porch that stands apart from the bounding box to it: no house could touch it."""
+    for place, size in SIZES:
+        found = columns.get(size, f"{name}.{place}", f"{name}.{size}")
+        if found:
+            house, at, porch = found
+            half = porch / house / 2
+            _put(at, np.clip(at, -half, 1 + half), held, f"{name}.{place}")
 
 
 HOUSE = ("width", "depth", "bcr")

@@ -45,16 +45,15 @@ class RoofLibrary:
 def read_roof_library(path: str) -> RoofLibrary:
     """Return the roofs of buildings (.json, .jsonl, folder)."""
     try:
-        return RoofLibrary(read([path], "building"))
+        return RoofLibrary(read(path, Building))
     except InvalidInput as error:
-        raise error if error.place.source else error.at(path) from None
+        raise error.at(path) from None
 
 
 def _roofs(building: Building) -> dict[str, Roof]:
-    boxes = [box for box in building.boxes if box.kind == "general" and box.roof is not None]
     found: dict[str, Roof] = {}
-    for box in sorted(boxes, key=lambda box: -box.width * box.depth):
-        bit = ROOF_OF_STYLE.get(box.roof.style) if box.roof else None
-        if bit is not None and box.roof is not None and box.roof.style != "shed":
-            found.setdefault(bit, box.roof)
+    general = (box for box in building.boxes if box.kind == "general")
+    for box in sorted(general, key=lambda box: -box.width * box.depth):
+        if box.roof is not None and box.roof.style in ROOF_OF_STYLE and box.roof.style != "shed":
+            found.setdefault(ROOF_OF_STYLE[box.roof.style], box.roof)
     return found

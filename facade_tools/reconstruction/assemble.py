@@ -27,7 +27,7 @@ from ..errors import InvalidInput
 from ..geometry.boxes import box_rectangles
 from ..geometry.floors import mass_boxes
 from ..geometry.pieces import facade_pieces
-from .axes import on_axes
+from .axes import meets, on_axes
 from .doors import USUAL, door_head
 from .sides import SideView
 
@@ -189,7 +189,7 @@ def _filled(
         element = None
         if piece is not None:
             element = _placed(piece, side, opening, (low, high), known.style)
-        if piece is None or element is None or _meets(element, own[piece.id]):
+        if piece is None or element is None or meets(element, own[piece.id]):
             dropped += 1
         else:
             own[piece.id].append(element)
@@ -279,17 +279,6 @@ def _placed(
         return None
     place = (round(left, 4), round(low, 4), round(right - left, 4), round(high - low, 4))
     return Element(opening.kind, "plain" if door else style, *place, known=True)
-
-
-def _meets(element: Element, others: list[Element]) -> bool:
-    """Tell whether an element overlaps another one."""
-    return any(
-        element.u < other.u + other.width
-        and other.u < element.u + element.width
-        and element.v < other.v + other.height
-        and other.v < element.v + element.height
-        for other in others
-    )
 
 
 # --- the main door ------------------------------------------------------------------------------

@@ -6,7 +6,7 @@ Attributes compare centres to 10 cm, so that aligned facades would count as unal
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from ..artifacts.building import Element, Piece, Side
@@ -82,16 +82,18 @@ def _moved(piece: Piece, number: int, shift: float) -> Piece:
     placed = replace(window, u=round(window.u + shift, 6))
     inside = APART <= placed.u <= piece.width - window.width - APART
     others = (e for k, e in enumerate(piece.elements) if k != number)
-    if not inside or any(_near(placed, other) for other in others):
+    if not inside or meets(placed, others, APART):
         return piece
     rows = (*piece.elements[:number], placed, *piece.elements[number + 1 :])
     return replace(piece, elements=rows)
 
 
-def _near(window: Element, other: Element) -> bool:
-    return (
-        window.u < other.u + other.width + APART
-        and other.u < window.u + window.width + APART
-        and window.v < other.v + other.height
-        and other.v < window.v + window.height
+def meets(element: Element, others: Iterable[Element], apart: float = 0.0) -> bool:
+    """Tell whether an element overlaps another one, or is nearer to it than `apart` beside it."""
+    return any(
+        element.u < other.u + other.width + apart
+        and other.u < element.u + element.width + apart
+        and element.v < other.v + other.height
+        and other.v < element.v + element.height
+        for other in others
     )

@@ -26,7 +26,7 @@ from facade_tools.randomness import item_generator
 
 from ._items import each
 from ._options import StreamOptions, refuse_overwriting
-from ._rectifying import check_rectification, check_view, rectification_of
+from ._rectifying import check_rectification, rectification_of, told_view
 from ._stream import (
     Faults,
     file_name,
@@ -41,6 +41,8 @@ from ._tables import METHODS, load
 
 NAME = "parse-image"
 SOLVER = "dp"
+FEW_LINES = 0.2  # structure of skies, noise, plants, animals, and of blurred facades
+APART = 0.4  # agreement of the windows of two readings of what is no facade
 
 
 @dataclass(frozen=True)
@@ -102,9 +104,11 @@ class Read:
             if self.options.rectify is not None:
                 turned = rectification_of(photo, self.options.rectify)
                 photo, mask = _straight(photo, mask, turned)
-            structure = check_view(path, photo, straight=turned is not None)
+            structure = told_view(path, photo, straight=turned is not None)
             method = _method(self.options.method, _read_options(self.options))
             reading = method(photo, identity, rng=rng, mask=mask)
+            if self.options.method == "both":
+                _check_facade(structure, reading)
         except InvalidInput as error:
             raise error.at(path) from None
         except FacadeError as error:
@@ -132,6 +136,18 @@ class Read:
             yield "raw_labels", write_png(reading.raw)
         if self.options.overlay:
             yield "overlay", write_png(overlay(photo.pixels, reading.parse))
+
+
+def _check_facade(structure: float | None, reading: Reading) -> None:
+    """Raise InvalidInput where neither lines nor both readings' windows speak for a facade.
+
+    Skies, noise and plants have neither; a blurred facade has no lines, but its windows agree.
+    """
+    found = reading.parse.tags.get("agreement")
+    agreement = found if isinstance(found, float) else 0.0  # without mrf's reading there is none
+    if structure is not None and structure < FEW_LINES and agreement < APART:
+        told = f"structure is {structure:.2f}, agreement {agreement:.2f}"
+        raise InvalidInput(f"shows no facade ({told}); expected {FEW_LINES:g} or {APART:g}")
 
 
 def _read_options(options: ParseOptions) -> ReadOptions:

@@ -29,8 +29,6 @@ from ._stream import to_stdout
 
 LOG = logging.getLogger("facade_tools.rectify")
 
-NO_FACADE = 0.2  # structure of a picture that is not read: skies, noise, plants, animals
-
 
 def run_rectify(image: str, output: str, corners: str, report: str | None) -> None:
     """Read, rectify, write the picture and the report."""
@@ -66,16 +64,13 @@ def _tell_guess(image: str, found: Rectification) -> None:
         LOG.warning("%s: its lines do not tell the focal length; width to height is a guess", image)
 
 
-def check_view(image: str, photo: Photo, *, straight: bool) -> float | None:
+def told_view(image: str, photo: Photo, *, straight: bool) -> float | None:
     """Return the structure of a photograph that is to be read (None: too small to tell).
 
     Warns where it shows few lines of a facade, and, unless it was made straight, where it looks
-    taken at an angle. Raises InvalidInput where it shows no facade at all.
+    taken at an angle.
     """
     view = view_of(photo.pixels)
-    if view.structure is not None and view.structure < NO_FACADE:
-        told = f"shows too few lines in two directions (structure {view.structure:.2f})"
-        raise InvalidInput(f"{told}; expected a facade ({NO_FACADE:g} or more)")
     if view.structure is not None and view.structure < LEAST_CONFIDENCE:
         LOG.warning("%s: hardly looks like a facade (structure %.2f)", image, view.structure)
     if view.angle is not None and not straight:

@@ -201,31 +201,48 @@ def test_the_structure_of_facades_and_of_what_is_none(front):
     assert view_of(np.tile(front[:200], (1, 30, 1))).structure is None  # 1,000 pixels of 101 rows
 
 
-def test_parse_image_refuses_what_is_no_facade_and_says_how_much_one_looks_like_one(
-    facade, front, tmp_path
-):
-    """The last picture shows a facade behind wires in all directions."""
+def test_parse_image_refuses_what_is_no_facade_but_not_a_blurred_one(facade, tmp_path):
+    """Two readings agree about the windows of a facade without lines, of clouds they do not."""
+    sharp = cv2.imread(str(PHOTOS / "facade-3.jpg"))
+    rng = np.random.default_rng(0)
+    clouds = cv2.GaussianBlur(rng.normal(0, 1, (500, 400, 3)), (0, 0), 12)
+    clouds = 255 * (clouds - clouds.min()) / np.ptp(clouds)
+    blurred = cv2.GaussianBlur(sharp, (0, 0), sharp.shape[0] / 150)
+    flat = np.full((500, 400, 3), 90, np.uint8)
+    for name, picture in (("a", flat), ("b", clouds.astype(np.uint8)), ("c", blurred)):
+        cv2.imwrite(str(tmp_path / f"{name}.png"), picture)
+    out = tmp_path / "out.jsonl"
+    done = facade("parse-image", tmp_path, "--method", "both", "-o", out, "--on-error", "skip")
+    assert done.returncode == 3
+    lines = done.stderr.decode().splitlines()
+    for name in "ab":
+        assert [line for line in lines if f"{name}.png: shows no facade (structure" in line]
+    assert [line for line in lines if "hardly looks like a facade" in line and "c.png" in line]
+    (parse,) = [json.loads(line) for line in out.read_text().splitlines()]
+    assert parse["id"] == "c"
+    assert parse["tags"]["structure"] < 0.2
+    assert parse["tags"]["agreement"] > 0.4
+
+
+def test_one_reading_only_warns_of_what_hardly_looks_like_a_facade(facade, front, tmp_path):
+    """The second picture shows a facade behind wires in all directions."""
     rng = np.random.default_rng(0)
     wires = front.copy()
     for _ in range(60):
         ends = rng.integers(0, (WIDTH, HEIGHT), (2, 2))
         cv2.line(wires, *map(tuple, ends.tolist()), tuple(rng.integers(0, 255, 3).tolist()), 2)
-    for name, picture in (("a", np.full((300, 260, 3), 90, np.uint8)), ("b", front), ("c", wires)):
+    for name, picture in (("a", front), ("b", wires)):
         cv2.imwrite(str(tmp_path / f"{name}.png"), picture[:, :, ::-1])
     out = tmp_path / "out.jsonl"
-    done = facade("parse-image", tmp_path, "--method", "mrf", "-o", out, "--on-error", "skip")
-    assert done.returncode == 3
+    done = facade("parse-image", tmp_path, "--method", "mrf", "-o", out)
+    assert done.returncode == 0
     lines = done.stderr.decode().splitlines()
-    assert any(
-        "a.png: shows too few lines in two directions (structure 0.00); expected a facade" in line
-        for line in lines
-    )
-    assert [line for line in lines if "hardly looks like a facade" in line and "c.png" in line]
+    (told,) = [line for line in lines if "hardly looks like a facade" in line]
+    assert "b.png" in told
     parses = [json.loads(line) for line in out.read_text().splitlines()]
-    assert [parse["id"] for parse in parses] == ["b", "c"]
     structures = [parse["tags"]["structure"] for parse in parses]
     assert structures[0] > 0.6
-    assert 0.2 <= structures[1] < 0.35
+    assert structures[1] < 0.35
 
 
 def test_parse_image_says_what_was_taken_at_an_angle(facade, tmp_path):

@@ -14,7 +14,7 @@ from facade_tools.errors import Infeasible, InvalidInput
 from facade_tools.exteriors.coordinates import read_attributes
 from facade_tools.exteriors.evaluation import negative_log_density
 from facade_tools.exteriors.learning import LearnOptions, learn_model
-from facade_tools.exteriors.physical import settle
+from facade_tools.exteriors.physical import Columns, settle, storey_heights, storey_ranges
 from facade_tools.exteriors.prior import shipped_prior
 from facade_tools.exteriors.relations import contradictions
 from facade_tools.exteriors.sampling import draw_bits
@@ -96,6 +96,31 @@ def test_a_second_floor_of_almost_nothing_is_none(model):
     settle(given.values, network.layout)
     assert len(r1) >= 3
     assert (r1 == 0).all()
+
+
+@pytest.mark.parametrize(
+    ("height", "r1", "r2", "storey"),
+    [
+        (2.44, 0.0, 0.0, 3.0),
+        (4.88, 1.0, 0.0, 2.44),  # of 3 m the upper one would be 1.88 m high
+        (5.4, 1.0, 0.0, 3.0),
+        (4.4, 1.0, 0.0, 2.933),  # eaves of a storey and a half: there is no better
+        (17.0, 1.0, 1.0, 17.0 / 6),
+        (18.0, 1.0, 1.0, 3.0),
+        (7.2, 1.0, 1.0, 2.4),
+    ],
+)
+def test_the_uppermost_storey_is_as_high_as_a_person_needs(model, height, r1, r2, storey):
+    network = network_of(model)
+    rows = read_attributes(draw(model, 1), network.layout)
+    columns = Columns(rows.values, network.layout)
+    for name, value in (("height", height), ("r1", r1), ("r2", r2 if r1 else np.inf)):
+        columns.get(name)[0][:] = value
+    found = storey_heights(rows.values, network.layout, 3.0)[0]
+    assert found == pytest.approx(storey, abs=1e-3)
+    floors, least, most = storey_ranges(rows.values, network.layout)
+    assert floors[0] == 1 + (r1 > 0) + (r2 > 0)
+    assert least[0] <= found <= most[0]
 
 
 def test_porch_before_the_house_is_no_wider_than_the_house(model):

@@ -16,7 +16,7 @@ from .dataset import Masks
 from .groups import ABSENT, ATOM_TOLERANCE, Group, least_bdry
 from .layout import Layout
 from .network import Network
-from .physical import Columns, settle, storey_heights
+from .physical import Columns, settle, storey_ranges
 from .relations import ROUNDED, completed, contradictions, states_storeys
 from .sampling import Draws
 from .shared_values import SharedValues, take_up
@@ -85,8 +85,8 @@ def accept(rows: Readings, network: Network, given: Attributes, held: tuple[Bits
     if given.bounds is not None:
         good &= _in_bounds(columns, given.bounds)
     if states_storeys(given) and not _heights_known(given.mass):
-        usual = storey_heights(rows.values, layout, given.storey_height)
-        good &= np.abs(usual / given.storey_height - 1) <= NEAR
+        _, least, most = storey_ranges(rows.values, layout)
+        good &= (least <= given.storey_height) & (given.storey_height <= most)
     return good & _garage_fits(columns)
 
 

@@ -16,6 +16,7 @@ from .dataset import Masks
 from .full_plans import Part, rectangle_exposure, snapped_garage, touching
 from .groups import ABSENT, ATOM_TOLERANCE
 from .layout import Layout
+from .relations import MOST_FLOORS
 
 MIDDLE = 0.5
 GAP = 1e-3  # how far a porch keeps from the middle line, relative
@@ -55,16 +56,36 @@ def no_second_floor(values: tuple[Floats, ...], layout: Layout) -> None:
 def storey_heights(values: tuple[Floats, ...], layout: Layout, typical: float) -> Floats:
     """Return a storey height (n,) for each row, metres: `typical`, moved to suit its floors.
 
+    Where the uppermost of typical storeys would be lower than a person needs, and storeys of equal
+    height would not, all are equal: they are those of a lower kind of house.
+    """
+    height = Columns(values, layout).get("height")
+    if not height:
+        return np.full(len(values[0]), typical)
+    floors, least, most = storey_ranges(values, layout)
+    count = np.where(floors < MOST_FLOORS, floors, np.floor(height[0] / typical + 0.5))
+    count = np.maximum(count, floors)
+    low = height[0] - (count - 1) * typical < LEAST_STOREY
+    equal = height[0] / count
+    usual = np.where(low & (equal >= LEAST_STOREY), equal, typical)
+    return np.asarray(np.clip(usual, least, most))
+
+
+def storey_ranges(values: tuple[Floats, ...], layout: Layout) -> tuple[Floats, Floats, Floats]:
+    """Return for each row (n,) its floors and the least and greatest storey height (m) they allow.
+
     Floor i exists where the house reaches above (i + 1/2) storeys, so that a house of N floors is
-    (N − 1/2) to (N + 1/2) storeys high; with three floors it may be higher.
+    (N − 1/2) to (N + 1/2) storeys high; with three floors it may be higher. Where the layout has
+    no floors any height is possible.
     """
     found = Columns(values, layout).get("height", "r1", "r2")
     if not found:
-        return np.full(len(values[0]), typical)
+        one = np.ones(len(values[0]))
+        return one, 0.0 * one, np.inf * one
     height, r1, r2 = found
-    floors = 1 + (r1 > ATOM_TOLERANCE) + (np.isfinite(r2) & (r2 > ATOM_TOLERANCE))
-    least = np.where(floors < 3, height / (floors + 0.5), 0.0) * (1 + 1e-6)
-    return np.asarray(np.clip(typical, least, height / (floors - 0.5) * (1 - 1e-6)))
+    floors = 1.0 + (r1 > ATOM_TOLERANCE) + (np.isfinite(r2) & (r2 > ATOM_TOLERANCE))
+    least = np.where(floors < MOST_FLOORS, height / (floors + 0.5), 0.0) * (1 + 1e-6)
+    return floors, least, height / (floors - 0.5) * (1 - 1e-6)
 
 
 def _floors_under_eaves(

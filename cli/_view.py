@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain, islice
 from pathlib import Path
 from typing import Any
@@ -120,7 +120,14 @@ def _emit(output: str, data: bytes) -> None:
         write_bytes(Path(output), data)
 
 
+def _shown(path: str) -> str:
+    """Return the sheet of a style's folder, which shows its blocks too; any other path itself."""
+    sheet = Path(path) / "stylesheet.json"
+    return str(sheet) if sheet.is_file() else path
+
+
 def _sheet(stream: StreamOptions, options: ViewOptions, faults: Faults) -> Picture:
+    stream = replace(stream, inputs=tuple(map(_shown, stream.inputs)))
     pictures: list[Picture] = []
     labels: list[str] = []
     for name, seen in _rendered(stream, options, faults):

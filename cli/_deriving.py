@@ -35,6 +35,7 @@ def run_derive(grammar: str, stream: StreamOptions, values: Mapping[str, Any]) -
     for output in outputs:
         refuse_single(output, values["count"], "buildings")
     refuse_overwriting([grammar, footprint], outputs)
+    loaded = load(grammar)
     sources = (
         *(side_input(grammar) if grammar not in builtin_names() else ()),
         *(side_input(footprint) if footprint != "-" else ()),
@@ -45,7 +46,7 @@ def run_derive(grammar: str, stream: StreamOptions, values: Mapping[str, Any]) -
     seed = stream.seed or 0
     provenance = Provenance(NAME, seed, recorded, sources)
     made = wanted(stream.output, values["tree"])
-    maker = Maker(load(grammar), given, seed, provenance, made)
+    maker = Maker(loaded, given, seed, provenance, made)
     tasks = _tasks(maker, values)
     faults = Faults(NAME, stream.on_error)
     write_models(each(maker, stream, faults, tasks), (stream.output, values["tree"]), faults)

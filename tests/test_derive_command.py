@@ -104,3 +104,9 @@ def test_several_buildings_do_not_go_into_one_json_file(facade_here, tmp_path):
     done = facade_here("derive", "haussmann", "--footprint", name, "-o", name)
     assert done.returncode == 2
     assert b"is an input and would be overwritten" in done.stderr
+
+
+def test_a_mistyped_grammar_gets_the_list_of_shipped_ones(facade_here, tmp_path):
+    done = facade_here("derive", "hausmann", "-o", tmp_path / "a.jsonl")
+    assert done.returncode == 3
+    assert b"is neither a file nor a shipped grammar (haussmann, " in done.stderr

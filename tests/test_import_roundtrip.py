@@ -64,6 +64,14 @@ def test_a_model_edited_elsewhere_is_read_by_its_geometry(facade, tmp_path) -> N
     assert row["partial"] is True
 
 
+def test_an_artifact_needs_no_import(facade, tmp_path) -> None:
+    path = tmp_path / "house.json"
+    path.write_text('{"schema": "facade-tools/building/1", "id": "a"}')
+    run = facade("import", path)
+    assert run.returncode == 3
+    assert b"house.json: is an artifact already" in run.stderr
+
+
 def test_a_foreign_mesh_is_refused_by_name(facade, tmp_path) -> None:
     mesh = tmp_path / "cube.obj"
     mesh.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")

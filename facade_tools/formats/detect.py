@@ -37,6 +37,8 @@ class Format:
         return build
 
 
+ARTIFACT_BYTES = 200  # in which an artifact names its schema
+
 # The first that recognises a file reads it.
 FORMATS = (
     Format("HOT2000", "hot2000"),
@@ -59,4 +61,6 @@ def detect(head: bytes) -> Format:
     names = ", ".join(row.name for row in FORMATS)
     if not head.strip():
         raise InvalidInput(f"is empty; expected {names}")
+    if b'"facade-tools/' in head[:ARTIFACT_BYTES]:
+        raise InvalidInput("is an artifact already, which every stage reads; nothing to import")
     raise InvalidInput(f"is in no format that is known by its content; expected {names}")

@@ -21,7 +21,6 @@ ROWS, LAYERED = 24, 0.05  # a picture's rows, and their least standard deviation
 TOLERATED = 0.1  # stretch of a texture in which no windows were found
 LONG = 3.0  # m: walls that keep the scale of what is on them when they are stretched by more
 SMEARED, FILLED = 2.0, 3.0  # stretch of walls, of long walls, beyond which their texture repeats
-NARROW = 0.3  # m: of a strip that would look like the folds of an accordion
 Part = tuple[tuple[float, float], tuple[float, float]]  # shares: left and right, top and bottom
 WHOLE: Part = ((0.0, 1.0), (0.0, 1.0))
 Singles = NDArray[np.float32]
@@ -80,8 +79,6 @@ def positions(
         strip = (0.0, 1.0)
         if signal is not None and widths[k] > 0:
             first, width = _plainest(starts[k : k + 1], widths[k : k + 1], source, signal())
-            if width < NARROW:
-                first, width = first + width / 2, 0.0
             strip = ((first - starts[k]) / widths[k], width / widths[k])
         share[here] = filled(share[here], stretch[here], strip)
     places: Floats = np.clip((starts[index] + share * widths[index]) / source, 0.0, 1.0)
@@ -116,8 +113,7 @@ def filled(share: Floats, stretch: Floats | float, strip: tuple[float, float]) -
     """Bring a section to a much larger size at its own scale: its halves stay at their ends.
 
     What is between them shows the strip (start and width, shares of the section) to and fro, so
-    that neither are pixels smeared nor does what frames a window appear where none is. A strip
-    without width is one place all over.
+    that neither are pixels smeared nor does what frames a window appear where none is.
     """
     place = share * stretch
     runs = (place - 0.5) / max(strip[1], 1e-9)

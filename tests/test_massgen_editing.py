@@ -176,6 +176,26 @@ def test_a_porch_in_a_notch_of_the_plan_gets_a_plan_with_a_notch(depth, width):
         assert mass.energy.mass < 1e-3
 
 
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_porch_in_a_corner_of_the_plan_stands_outside_the_walls(side):
+    """The corner may be left or right, as far as the attributes of the house alone say."""
+    flat = Roof("flat")
+    house = Building(
+        "corner",
+        (
+            Box("main", "general", 0, 6, 14, 7, 3.0, flat),
+            Box("wing", "general", side * 3.5, 1, 7, 4, 3.0, flat),
+            Box("porch", "porch", side * -2.0, 1.3, 4, 2.4, 2.5, flat),
+        ),
+    )
+    for seed in range(5):
+        wanted = replace(building_attributes(house), id=f"corner-{seed}")
+        (mass,) = generate_mass(wanted, rng=np.random.default_rng(seed))
+        (porch,) = (box for box in mass.boxes if box.kind == "porch")
+        assert mass.energy.mass < 1e-3
+        assert all(_overlap(porch, box) < 2e-3 for box in mass.boxes if box is not porch)
+
+
 @pytest.mark.parametrize("width", [2.2, 4.0, 6.0])
 def test_posts_and_roof_of_a_new_porch_leave_known_elements_free(width):
     wall = Piece("front-1", "main", (0.0, 0.0, 0.0), 10.0, 3.0, (KNOWN_WINDOW, KNOWN_DOOR))

@@ -32,6 +32,7 @@ from facade_tools.exteriors.mass_layout import (
     thinness,
 )
 from facade_tools.exteriors.mass_polish import gather, polish, round_layout, scatter
+from facade_tools.exteriors.mass_taste import covered_share
 
 WORK = new_work()
 
@@ -141,6 +142,18 @@ def test_thinness_equals_the_oracle(cases):
         attributes_of_layout(layout_of(boxes), 3.0, WORK)
         for least in (0.5, 2.5):
             assert thinness(WORK, least) == pytest.approx(oracle_thin_strips(boxes, least))
+
+
+def test_share_of_a_porch_in_the_house_equals_the_oracle(cases):
+    for boxes in cases[:120]:
+        attributes_of_layout(layout_of(boxes), 3.0, WORK)
+        plans = polygons(boxes)
+        # At storeys of 3 m all solid boxes of the cases have a ground floor.
+        solid = unary_union([p for p, b in zip(plans, boxes, strict=True) if b.kind != "porch"])
+        for k, (plan, box) in enumerate(zip(plans, boxes, strict=True)):
+            if box.kind == "porch":
+                share = plan.intersection(solid).area / plan.area
+                assert covered_share(k, WORK) == pytest.approx(share)
 
 
 # --- energy ---------------------------------------------------------------------------------------

@@ -2,7 +2,7 @@
 
 FW16 stops at the first layout under its threshold. Many layouts share their 27 attributes, so we
 go on and take the one of least `clumsiness`: few boxes and corners, no slivers, no courtyards,
-no steps too small to build, a garage that a car can leave.
+no steps too small to build, a garage that a car can leave, porches outside the walls.
 """
 
 from __future__ import annotations
@@ -21,6 +21,8 @@ TOWER_WIDTH = 4.6  # widest plan of a tower (m)
 TOWER_RATIO = 1.5  # of its sides at most
 SLIVER = 1.3  # … and thinner than this, absurd (m)
 CAR = 2.4  # free wall that a garage door needs (m)
+IN_HOUSE = 6.0  # price of a porch that lies whole in the house, in proportion to its plan there
+MEETS_HOUSE = 3.0  # … and of one that lies in it at all
 
 
 @compiled
@@ -108,6 +110,19 @@ def _roofless(layout: Layout, styles: int) -> int:
 
 
 @compiled
+def covered_share(k: int, work: Work) -> float:
+    """Return the share of box k's plan that lies in the house: under general boxes and garages."""
+    i0, j0, i1, j1 = work.spans[k, 0], work.spans[k, 1], work.spans[k, 2], work.spans[k, 3]
+    covered = 0.0
+    whole = (work.xs[i1] - work.xs[i0]) * (work.ys[j1] - work.ys[j0])
+    for i in range(i0 + 1, i1 + 1):
+        for j in range(j0 + 1, j1 + 1):
+            if work.levels[i, j] > 0:
+                covered += (work.xs[i] - work.xs[i - 1]) * (work.ys[j] - work.ys[j - 1])
+    return covered / max(whole, 1e-9)
+
+
+@compiled
 def clumsiness(layout: Layout, tower: bool, styles: int, work: Work) -> float:
     """Return a penalty ≥ 0 (no unit) of a layout whose grid `work` describes.
 
@@ -122,6 +137,9 @@ def clumsiness(layout: Layout, tower: bool, styles: int, work: Work) -> float:
     for k in range(CAPACITY):
         kind = layout.kinds[k]
         total += 0.35 if kind == GENERAL else 0.0
+        if kind == PORCH:
+            covered = covered_share(k, work)
+            total += IN_HOUSE * covered + MEETS_HOUSE * (covered > 1e-4)
         if kind == GARAGE:
             front, other = _door_walls(layout, k, work)
             total += 0.0 if front >= CAR else (0.7 if other >= CAR else 6.0)

@@ -119,7 +119,7 @@ def covered_share(k: int, work: Work) -> float:
         for j in range(j0 + 1, j1 + 1):
             if work.levels[i, j] > 0:
                 covered += (work.xs[i] - work.xs[i - 1]) * (work.ys[j] - work.ys[j - 1])
-    return covered / max(whole, 1e-9)
+    return float(covered / max(whole, 1e-9))
 
 
 @compiled
